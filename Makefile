@@ -3,6 +3,7 @@
 # make nodes   ROS 2 from PyPI, and the nodes: ahf_detector, ahf_illumination, ahf_scoreboard
 # make test    every check: ruff, mypy, the import rules, the site, the tests; then the tests that
 #              need no ROS with the oldest versions and without the processor's vector units
+# make test-colcon  the tests as colcon runs them, for once a week: half an hour
 # make site    the documentation as a site, build/site/index.html
 # All set up .venv first, with what they need; nothing is installed outside it.
 # DISTRIBUTION=kilted takes the wheels of ROS 2 Kilted instead of Jazzy, into .venv-kilted.
@@ -32,7 +33,7 @@ unexport AMENT_PREFIX_PATH CMAKE_PREFIX_PATH LD_LIBRARY_PATH PYTHONPATH
 unexport _ROS_WHEELS_BOOTSTRAP_COMPLETE
 
 .PHONY: demo nodes test lint site test-native test-live test-computing test-oldest test-portable \
-	test-kilted browser clean
+	test-kilted test-colcon browser clean
 .DELETE_ON_ERROR:
 
 demo: $(INSTALLED)
@@ -87,6 +88,10 @@ test-kilted:
 	$(MAKE) DISTRIBUTION=kilted .venv-kilted/ready
 	.venv-kilted/bin/python -m pytest \
 		$$(grep -lrE 'rclpy|graph: ' test --include='test_*.py' | grep -vE '$(LASTING)')
+
+# With ROS 2 from PyPI; where one is sourced, run the script itself.
+test-colcon:
+	env --unset=ROS_DISTRO test/colcon.sh build/colcon
 
 clean:
 	rm -rf .venv* build

@@ -16,8 +16,9 @@ from statistics import median
 import cv2
 import numpy as np
 
+from ahf_ros.codes import RING_NAMES
 from ahf_ros.codes.families import AUTO, families_of
-from ahf_ros.codes.ring import Family
+from ahf_ros.codes.ring import FAMILY_NAMES, Family, family, words_of_print
 from ahf_ros.detectors import create_detector
 from ahf_ros.detectors.contract import DetectorSettings
 from ahf_ros.detectors.ring.learning import LearntFamily, find_bands, learn_families
@@ -96,12 +97,29 @@ def _lines(image: np.ndarray, settings: DetectorSettings, expected: int) -> Iter
         yield f'{counted(count, "target")} of {name}: --family {name}'
         yield edge_shift_remark(median_edge_shift(found))
         return
+    if shared := list(_of_shared_prints(image, settings)):
+        yield from shared
+        return
     middle = _enlarged_middle(image)
     if learnt := _learnt(middle):
         yield from _of_bands(learnt, _ENLARGED, settings, expected)
     elif small := _identified(middle, replace(settings, max_radius=1e4)):
         radius = median(target.semi_major for target in small) / _ENLARGED
-        yield _of_size(len(small), radius, settings)
+        yield _of_size(len(small), radius, settings.narrowed({it.family for it in small}))
+
+
+def _of_shared_prints(image: np.ndarray, settings: DetectorSettings) -> Iterator[str]:
+    """Yield what targets are that several of the families have, too few to tell which it is."""
+    codes = tuple(family(name) for name in settings.families if name in RING_NAMES)
+    widest = [code.name for code in codes if code.has_all_words]
+    if not 0 < len(widest) < len(codes):
+        return
+    found = evident(_identified(image, settings.narrowed(widest)))
+    shown = Counter(tuple(words_of_print(family(it.family), it.code, codes)) for it in found)
+    for of_print, count in shown.most_common(1):
+        names = sorted(code.name for code in of_print)
+        if len(names) > 1:
+            yield f'{counted(count, "target")} of {" or ".join(names)}: --family says which'
 
 
 def _learnt(image: np.ndarray) -> LearntFamily | None:
@@ -117,7 +135,8 @@ def _of_bands(
     polarity, count = int(np.median(found.bands.polarity)), len(found.words)
     own = families_of(settings.family_file).values() if settings.family_file else ()
     known = found.known([code for code in own if isinstance(code, Family)])
-    size = _of_size(count, float(np.median(found.bands.size)) / scale, settings)
+    rings = settings.narrowed(known or FAMILY_NAMES)
+    size = _of_size(count, float(np.median(found.bands.size)) / scale, rings)
     edges = edge_shift_remark(found.growth * polarity / scale)
     exact = scale == 1 and np.median(found.bands.spread) < _EXACT
     dots = f'{count} dots with a band of {found.bits} sectors'

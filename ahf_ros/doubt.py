@@ -7,8 +7,11 @@ from ahf_ros.target import UNDECODED, Target
 DOUBTFUL_BELOW = 0.95
 """Confidence below which a decoded target counts as doubtful."""
 
+_PROBABILITIES = 'probabilities are reported from 0.75 on'
 _MEANING = {
-    'ring': 'ring reports probabilities from 0.75 on',
+    'ring': _PROBABILITIES,
+    'cctag': _PROBABILITIES,
+    'several': _PROBABILITIES,
     'traditional': 'no probability: how clearly the band is read',
     'gsi_published': 'no probability: how exactly the design fits',
     'dots_published': 'no probability: how many samples agree, from 0.75 on',

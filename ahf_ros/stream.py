@@ -17,9 +17,8 @@ import numpy as np
 from ahf_ros.detectors.contract import Detector, Unavailable
 from ahf_ros.filtering.identifier import Identifier, Memory
 from ahf_ros.imaging.image import check_image
-from ahf_ros.imaging.movement import Displacement, displacement, find_edges
+from ahf_ros.imaging.movement import Displacement, displacement, find_edges, targets_moved
 from ahf_ros.imaging.stack import ImageStack, unlike
-from ahf_ros.imaging.witnesses import targets_moved
 from ahf_ros.interchange.image_files import NotedImage
 from ahf_ros.interchange.image_messages import decode_compressed, decode_image, nanoseconds
 from ahf_ros.session import create_identifier

@@ -6,10 +6,10 @@ import json
 import textwrap
 from pathlib import Path
 
-from ahf_ros.nodes.pose_settings import PoseNodeSettings
 from ahf_ros.nodes.settings import (
     DetectorNodeSettings,
     IlluminationNodeSettings,
+    PoseNodeSettings,
     RegistrationNodeSettings,
 )
 from ahf_ros.settings.nested import flat_parameters

@@ -13,8 +13,7 @@ from typing import Any
 
 from ahf_ros.nodes.drivers import DRIVERS
 from ahf_ros.nodes.interfaces import NODES
-from ahf_ros.nodes.pose_settings import PoseNodeSettings
-from ahf_ros.nodes.settings import DetectorNodeSettings
+from ahf_ros.nodes.settings import DetectorNodeSettings, PoseNodeSettings
 from ahf_ros.settings.nested import flat_parameters
 from ahf_ros.settings.parameter import Parameter
 from ahf_ros.synthetic.patterns import LIGHT_NAMES

@@ -243,7 +243,7 @@ def _evidence(gray: np.ndarray, best: Hypotheses) -> tuple[Evidence, Words]:
     radii = np.array([0.3, 0.6, 1.5, 1.8, 2.5, 2.75, 3.0, 3.25, 3.8, 4.1])
     levels = sample_circles(gray, best.frames, angles, radii)
     known = predicted_light(gray, best.frames, polar.lift, angles, radii, TABLE.band)
-    evidence = edges.plus(level_evidence(polar, levels, *known, radii, TABLE.band))
+    evidence = edges.plus(level_evidence(polar, levels, *known, radii, growth, TABLE.band))
     return evidence, decode(evidence, 0 * growth, TABLE)
 
 

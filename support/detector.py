@@ -8,7 +8,7 @@ from functools import cached_property
 from pathlib import PurePosixPath
 from typing import Any
 
-from diagnostic_msgs.msg import DiagnosticArray
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rcl_interfaces.srv import GetParameters, SetParametersAtomically
 from rclpy.parameter import Parameter, parameter_value_to_python
 from sensor_msgs.msg import Image
@@ -66,6 +66,19 @@ class DetectorProcess:
     def told(self, name: str) -> str:
         """Return what the node said last about something, nothing before it said anything."""
         return values(self.diagnostics[-1])[name] if self.diagnostics else ''
+
+    def says(self, *words: str) -> dict[str, str]:
+        """Wait until the diagnostics warn in these words; return their entries."""
+
+        def said() -> DiagnosticStatus | None:
+            every = (message.status[0] for message in self.diagnostics)
+            return next((it for it in every if words[0] in it.message), None)
+
+        status = self.graph.until(said)
+        assert status.level == DiagnosticStatus.WARN
+        assert all(it in status.message for it in words), status.message
+        self.diagnostics.clear()
+        return {item.key: item.value for item in status.values}
 
     def answer(self, message: Image) -> CodedTargetArray:
         """Return the answer to an image."""

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Build and test with colcon, in a workspace of its own, as on a ROS installation. Run by hand; the
-# whole takes half an hour. CONTRIBUTING.md has what it printed last.
+# Build and test with colcon, in a workspace of its own, as on a ROS installation. make test-colcon
+# runs it; the whole takes half an hour.
 #
 #   test/colcon.sh WORKSPACE [PYTEST OPTION ...]
 #   test/colcon.sh /tmp/workspace -k nodes
@@ -29,9 +29,10 @@ of = configparser.ConfigParser()
 of.read('distributions.ini')
 print(of['jazzy']['build'], of['jazzy']['run'])")
         # shellcheck disable=SC2086
-        venv/bin/pip install --quiet colcon-common-extensions cmake catkin_pkg 'empy<4' \
-            hypothesis matplotlib 'numpy>=1.21' opencv-python-headless pytest pyyaml rich \
-            'rosbags>=0.11.7,<0.12' ruamel.yaml $wheels
+        venv/bin/pip install --quiet colcon-common-extensions cmake catkin_pkg 'empy<4' $wheels \
+            "$root[test]"
+        # Only what it needs: colcon builds the package itself.
+        venv/bin/pip uninstall --quiet --yes ahf_ros
         touch venv/ready
     fi
     export PATH="$workspace/venv/bin:$PATH"

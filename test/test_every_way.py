@@ -160,7 +160,7 @@ def nodes(graph: Any) -> Callable[[Case], Any]:
     """
     from std_msgs.msg import Header
 
-    from ahf_ros.nodes.image_msg import image_message
+    from ahf_ros.nodes.messages import image_message
     from support.detector import DetectorProcess
 
     @cache

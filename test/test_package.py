@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import importlib.util
+import json
 import re
 import shutil
 import subprocess
@@ -14,6 +15,7 @@ from fnmatch import fnmatch
 from functools import cache
 from pathlib import Path
 
+import cv2
 import pytest
 
 from support import ROOT
@@ -76,8 +78,16 @@ import importlib, sys
 
 for name in ('rclpy', 'sensor_msgs', 'std_msgs', 'rosidl_runtime_py', 'rosidl_parser'):
     sys.modules[name] = None
+"""
+WITH_ROS = 'import ahf_ros.msg, rclpy, sensor_msgs.msg, sys'
+IMPORT = """
 for name in sys.argv[1:]:
     importlib.import_module(name)
+"""
+COMMANDS = """
+import json
+from ahf_ros.cli import main
+sys.exit(max(map(main, json.loads(sys.argv[1]))))
 """
 
 
@@ -99,8 +109,34 @@ def test_everything_but_the_nodes_works_without_ros() -> None:
     names = [name for name in without if not name.endswith(('.__init__', '.__main__'))]
     assert len(names) > 50
     names += [f'ahf_ros.nodes.{name}' for name in ('settings', 'drivers', 'interfaces')]
-    done = python('-c', WITHOUT_ROS, *names)
+    done = python('-c', WITHOUT_ROS + IMPORT, *names)
     assert done.returncode == 0, done.stderr
+
+
+@needs_rosbags
+def test_results_are_the_same_by_byte_with_and_without_ros(tmp_path: Path) -> None:
+    pytest.importorskip('rclpy', reason='ROS 2 is not installed')
+    from support import bags
+
+    images = bags.scenes(2)
+    cv2.imwrite(str(tmp_path / 'image.png'), images[0])
+    bags.write_ros2(tmp_path / 'bag', bags.recorded(bags.typestore(), images))
+    search = '--detector', 'traditional', '--expected-targets', '4', '--population', '6'
+    given = []
+    for before in (WITH_ROS, WITHOUT_ROS):
+        out = tmp_path / str(len(given)) / 'out'
+        lines = [
+            ['identify', str(tmp_path / 'image.png'), '--json', *search],
+            ['bag', str(tmp_path / 'bag'), str(out), *search],
+        ]
+        done = python('-c', before + COMMANDS, json.dumps(lines))
+        assert done.returncode == 0, done.stderr
+        files = [it for it in sorted(out.rglob('*')) if it.is_file()]
+        line = re.sub(r'(?<="elapsed_s": )[\d.]+', '0', done.stdout.splitlines()[0])
+        given.append([line, *((it.relative_to(out), it.read_bytes()) for it in files)])
+    assert json.loads(given[0][0])['targets']
+    assert len(given[0]) > 2
+    assert given[0] == given[1]
 
 
 def test_every_module_is_used() -> None:

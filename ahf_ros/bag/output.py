@@ -262,7 +262,6 @@ def _write(
     journal: Journal,
     writer: Writer,
 ) -> None:
-    """Write all messages of a source with the answers."""
     copies = {
         (item.id, id(item.owner)): _added(writer, item, source) for item in source.connections
     }

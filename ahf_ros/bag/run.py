@@ -131,7 +131,6 @@ def _check_outside(bag: Path, kind: str, name: str, output: Path) -> None:
 
 
 def _answer_topics(task: BagTask, source: Source) -> dict[str, AnswerTopics]:
-    """Return the topics of the results by topic of the images."""
     if not _TOPIC_NAME.fullmatch(task.output_topic):
         raise ValueError(
             f'output_topic is {task.output_topic!r}, accepted are names of letters, digits and _, '
@@ -287,7 +286,6 @@ class _Answering:
         return message_frame(self._source.stores.deserialize(connection, data))
 
     def _messages(self, topics: AnswerTopics, answer: Answer[Any]) -> Iterator[Output]:
-        """Yield the messages about an image or a stack."""
         header, found = answer.items[-1], answer.identification
         message = coded_target_array(found, self._family, answer.stack.shape, header, self._types)
         yield topics.targets, bytes(self._store.serialize_cdr(message, CODED_TARGETS))

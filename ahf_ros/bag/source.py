@@ -202,7 +202,6 @@ class Source(ExitStack):
         ]
 
     def _open(self) -> None:
-        """Open the files of the bag."""
         paths = [self.path]
         if self.path.is_dir():
             paths = found = sorted(it for it in self.path.iterdir() if _ending(it) in _ENDINGS)
@@ -441,7 +440,6 @@ def _refused(topic: str, count: int, reason: str) -> str:
 
 
 def _encoding(item: Connection) -> str:
-    """Return how the messages of a topic are serialized."""
     assert isinstance(item.ext, ConnectionExtRosbag2)
     return item.ext.serialization_format
 

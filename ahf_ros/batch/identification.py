@@ -174,7 +174,6 @@ def _messages(
 
 
 def _lines(found: Identification, detector: str) -> Iterator[Message]:
-    """Yield a line about each target."""
     for target in found.targets:
         why = doubt(target, detector)
         yield Message(

@@ -50,7 +50,6 @@ def _looking(task: ImageTask) -> IdentificationSettings:
 
 
 def _shown(outcome: ImageOutcome) -> list[frozenset[str]]:
-    """Return the families of each record."""
     return [
         frozenset(it['family'] for it in record['targets'] if it['id'] != UNDECODED)
         for record in outcome.records

@@ -33,6 +33,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except BrokenPipeError:
         # Without this, the interpreter reports an error when it flushes the closed pipe.
         _discard_output()
+    except ModuleNotFoundError as error:
+        if error.name not in ('cv2', 'numpy'):
+            raise
+        print(f'ahf: error: {error.name} is missing, see ahf doctor', file=sys.stderr)
     except OSError as error:  # of standard output: a full disk
         _discard_output()
         print(f'ahf: error: {error.strerror or error}', file=sys.stderr)

@@ -39,7 +39,7 @@ COMMANDS = {
     'compare': ('cli.compare', 'Find the targets that moved between two networks.'),
     'learn-family': (
         'cli.learn_family',
-        'Learn template, positions and numbers of point-distributed targets from a survey.',
+        'Learn a family from photographs of its rings, or from a survey of its dots.',
     ),
     'demo': ('cli.demo', 'Identify a rendered image in three ways, which shows the method.'),
     'doctor': ('cli.doctor', 'Say what is installed, and what is missing for what.'),

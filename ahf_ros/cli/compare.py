@@ -143,7 +143,6 @@ def _verdict(found: Comparison) -> str:
 
 
 def _rows(found: Comparison) -> Iterator[list[object]]:
-    """Yield the rows of the table of movements."""
     yield [
         *('id', 'x', 'y', 'z', 'dx', 'dy', 'dz', 'length', 'sigma'),
         *(f'covariance_{it}' for it in ('xx', 'xy', 'xz', 'yy', 'yz', 'zz')),
@@ -157,7 +156,6 @@ def _rows(found: Comparison) -> Iterator[list[object]]:
 
 
 def _record(found: Comparison) -> dict[str, Any]:
-    """Return what was found as a JSON object."""
     return {
         'congruent': found.congruent,
         'moved': list(found.moved),

@@ -60,9 +60,12 @@ def _machine() -> Iterator[str]:
         f'{platform.release()} {platform.machine()}, {os.cpu_count()} cores'
     )
     for name in _required():
-        yield f'{name} {_version(name) or "is missing"}'
+        if not name.startswith('opencv'):
+            yield f'{name} {_version(name) or "is missing"}'
     if importlib.util.find_spec('cv2'):
         yield from _opencv()
+    else:
+        yield 'OpenCV is missing'
 
 
 def _opencv() -> Iterator[str]:
@@ -75,7 +78,9 @@ def _opencv() -> Iterator[str]:
         if (match := re.search(rf'{label}: *(.*)', about))
     }
     words = ', '.join(f'{label} {value}' for label, value in found.items() if value)
-    yield f'OpenCV {cv2.__version__} with {cv2.getNumThreads()} threads: {words}'
+    wheels = ', '.join(f'{name} {_version(name)}' for name in _OPENCV if _version(name))
+    source, threads = wheels or 'not of pip', cv2.getNumThreads()
+    yield f'OpenCV {cv2.__version__} ({source}) with {threads} threads: {words}'
 
 
 def _extras() -> Iterator[str]:
@@ -126,13 +131,13 @@ def _problems() -> Iterator[str]:
             f'{" ".join(several)}, then pip install opencv-python-headless'
         )
     if not importlib.util.find_spec('cv2'):
-        yield 'OpenCV is missing: pip install opencv-python-headless'
+        yield 'OpenCV is missing: pip install --force-reinstall --no-deps opencv-python-headless'
     sourced = os.environ.get('ROS_DISTRO')
     wheels = _version('ahf-ros-interfaces')
     if sourced and wheels and os.environ.get('AMENT_PREFIX_PATH'):
         yield (
             f'ROS 2 {sourced} is sourced, and the messages in this environment are compiled for '
-            'ROS 2 from PyPI: use one of them'
+            'ROS 2 from PyPI: start nodes where no ROS is sourced, or leave this environment'
         )
 
 

@@ -88,7 +88,6 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _learn_rings(options: argparse.Namespace) -> int:
-    """Learn ring families from photographs."""
     from ahf_ros.detectors.ring.learning import MINIMUM_TARGETS, Bands, find_bands, learn_families
     from ahf_ros.interchange.image_files import read_image
 
@@ -201,7 +200,6 @@ def _contact_sheet(learnt: LearntFamily, crops: dict[bytes, np.ndarray]) -> np.n
 
 
 def _learn_points(options: argparse.Namespace, points: str) -> int:
-    """Learn point-distributed targets from a point list."""
     from ahf_ros.codes.gsi import point_family
     from ahf_ros.codes.gsi_learning import learn_family, library_text, with_codes
     from ahf_ros.interchange.point_lists import read_point_list

@@ -229,7 +229,6 @@ def _cell(value: object, digits: str) -> str:
 
 
 def _show(points: MeasuredPoints, *found: Any) -> None:
-    """Print what was measured for people."""
     import numpy as np
 
     for name, (head, *rows), digits in _tables(*found):
@@ -251,7 +250,6 @@ def _show(points: MeasuredPoints, *found: Any) -> None:
 
 
 def _write(folder: Path, *found: Any) -> None:
-    """Write the tables of what was measured."""
     from ahf_ros.interchange.files import csv_table, write_whole
 
     for name, rows, _ in _tables(*found):
@@ -265,7 +263,6 @@ def _record(
     off: Sequence[Deviation],
     test: LengthTest | None,
 ) -> dict[str, Any]:
-    """Return what was measured as a JSON object."""
     record: dict[str, Any] = {'unit': points.unit}
     if far:
         record['distances'] = [

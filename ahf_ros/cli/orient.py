@@ -18,11 +18,15 @@ from ahf_ros.cli import tell
 from ahf_ros.cli.mounting import add_mounting_arguments, check_mounting, write_mountings
 from ahf_ros.cli.options import add_option, add_quiet, parsed_by
 from ahf_ros.extras import need
+from ahf_ros.interchange.export.formats import NETWORK_FORMATS, parsed_export
 from ahf_ros.settings.parameter import Parameter
+from ahf_ros.text import printable
 
 if TYPE_CHECKING:
+    from rich.console import Console
+
     from ahf_ros.interchange.exif import Exif
-    from ahf_ros.interchange.network_cameras import CameraKnowledge
+    from ahf_ros.interchange.network_files import CameraKnowledge
     from ahf_ros.interchange.observation_files import ObservedPhotograph
     from ahf_ros.orientation.network import Network
     from ahf_ros.orientation.solution import Solution
@@ -51,7 +55,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         '--export',
         action='append',
         default=[],
-        type=parsed_by(_export),
+        type=parsed_by(partial(parsed_export, formats=NETWORK_FORMATS)),
         metavar='FORMAT=DIR',
         help='Also write cameras, poses and targets for other software: colmap, metashape or '
         'mmvii. Repeatable.',
@@ -150,18 +154,6 @@ def _datum(text: str) -> tuple[str, tuple[str, ...]]:
     return kind, targets
 
 
-def _export(text: str) -> tuple[str, Path]:
-    from ahf_ros.interchange.export.networks import NETWORK_FORMATS
-
-    name, _, folder = text.partition('=')
-    if name not in NETWORK_FORMATS or not folder:
-        raise ValueError(
-            f'export is {text!r}, accepted is FORMAT=DIR with a format of '
-            f'{", ".join(NETWORK_FORMATS)}'
-        )
-    return name, Path(folder)
-
-
 def run(options: argparse.Namespace) -> int:
     """Orient the photographs, and write each group of them that hangs together."""
     need('orient')
@@ -203,7 +195,7 @@ def _cameras(
     photographs: Sequence[ObservedPhotograph], options: argparse.Namespace
 ) -> CameraKnowledge:
     from ahf_ros.interchange.camera_files import read_camera
-    from ahf_ros.interchange.network_cameras import CameraKnowledge, read_cameras
+    from ahf_ros.interchange.network_files import CameraKnowledge, read_cameras
 
     exif, sizes = _noted(photographs, options)
     return CameraKnowledge(
@@ -248,8 +240,8 @@ def _in_px(length: tuple[float, str] | None) -> Callable[[int, int], float] | No
 
 def _oriented(network: Network, options: argparse.Namespace) -> list[Solution]:
     from ahf_ros.orientation.datum import Datum
-    from ahf_ros.orientation.groups import separated
     from ahf_ros.orientation.orient import orient
+    from ahf_ros.orientation.solution import separated
 
     return separated(orient(network, datum=Datum(*options.datum) if options.datum else Datum()))
 
@@ -266,8 +258,7 @@ def _of_groups(solutions: Sequence[Solution], number: int) -> tuple[str, ...]:
 
 def _write(solution: Solution, number: int, options: argparse.Namespace) -> bool:
     """Write a network and its exports, print what was found, and return whether all is written."""
-    from ahf_ros.cli.network_table import print_network
-    from ahf_ros.interchange.export.networks import write_network_export
+    from ahf_ros.interchange.export.formats import write_network_export
     from ahf_ros.interchange.network_results import write_network
     from ahf_ros.report.network_page import write_network_page
 
@@ -299,3 +290,32 @@ def _write(solution: Solution, number: int, options: argparse.Namespace) -> bool
         tell('orient', error)
         written = False
     return written
+
+
+def print_network(solution: Solution, folder: str, console: Console | None = None) -> None:
+    """Print a network on standard error."""
+    from rich.markup import escape
+
+    from ahf_ros.cli.tables import print_table, terminal
+    from ahf_ros.orientation.strength import what_to_photograph
+    from ahf_ros.report import network_summary
+
+    console = console or terminal()
+    unit = solution.network.unit
+    print_table(folder, ('', ''), network_summary.summary(solution), console)
+    for index in solution.calibrated.nonzero()[0].tolist():
+        rows = network_summary.camera_rows(solution, index)
+        title = f'Camera {solution.network.cameras[index].name}'
+        print_table(title, ('parameter', 'value', 'standard deviation'), rows, console)
+    if bars := network_summary.bar_rows(solution):
+        head = '', 'role', f'length, {unit}', 'deviation', 'sigma', 'ratio'
+        print_table('Scale bars', head, bars, console)
+    if control := network_summary.control_rows(solution):
+        head = '', 'role', f'dx, {unit}', 'dy', 'dz', 'sigma x, y, z'
+        print_table('Control points', head, control, console)
+    if rejected := network_summary.rejected_rows(solution):
+        head = 'photograph', 'target', 'x, px', 'y, px', 'residual, sigma', 'why'
+        print_table(f'{len(rejected)} left out', head, rejected, console)
+    for mark, texts in (('yellow]!', solution.warnings), ('cyan]>', what_to_photograph(solution))):
+        for text in texts:
+            console.print(f'[{mark}[/] {escape(printable(text, len(text)))}', highlight=False)

@@ -15,6 +15,19 @@ CONFIDENCE = math.sqrt(5.991)
 _NAME = 16, 9  # px, that a name takes
 
 
+def principal_axes(places: FloatArray, towards: FloatArray) -> FloatArray:
+    """Return the directions (3, 3) right, up and to the viewer; places extend least along it.
+
+    The viewer is on the side that `towards` (3,) points to.
+    """
+    axes = np.linalg.svd(places - places.mean(axis=0), full_matrices=True)[2].copy()
+    if towards @ axes[2] < 0:
+        axes[2] *= -1
+    if np.linalg.det(axes) < 0:  # or the views would be mirrored
+        axes[1] *= -1
+    return axes
+
+
 def ellipse(covariance: FloatArray, axes: FloatArray) -> tuple[float, float, float]:
     """Return semi-axes of the ellipse that holds 95 % in a view along two axes (2, 3).
 

@@ -8,7 +8,13 @@ from html import escape
 
 import numpy as np
 
-from ahf_ros.drawing.coordinates import CONFIDENCE, apart, ellipse, round_number
+from ahf_ros.drawing.coordinates import (
+    CONFIDENCE,
+    apart,
+    ellipse,
+    principal_axes,
+    round_number,
+)
 from ahf_ros.orientation.congruence import Comparison, Movement
 from ahf_ros.orientation.network import FloatArray
 
@@ -37,13 +43,8 @@ def movements_figure(comparison: Comparison) -> str:
     movement: where it holds the target, the movement is no more than its errors in this view.
     """
     places = np.array([it.place for it in comparison.movements])
-    centred = places - places.mean(axis=0)
-    axes = np.linalg.svd(centred, full_matrices=True)[2].copy()
-    if axes[2, 2] < 0:
-        axes[2] *= -1
-    if np.linalg.det(axes) < 0:  # or the views would be mirrored
-        axes[1] *= -1
-    flat = centred @ axes.T
+    axes = principal_axes(places, np.array((0.0, 0.0, 1.0)))
+    flat = (places - places.mean(axis=0)) @ axes.T
     scale = (_VIEW - 2 * _MARGIN) / float(np.ptp(flat[:, 0]))
     longest = max(_size(it) for it in comparison.movements)
     enlarged = round_number(_ARROW * _VIEW / scale / longest) if longest > 0 else 1.0

@@ -316,7 +316,6 @@ def _fixed(*coordinates: float) -> tuple[int, ...]:
 def _draw_labels(
     canvas: np.ndarray, labels: Sequence[Label], unit: int, taken: Sequence[Box]
 ) -> None:
-    """Write the labels, in letters of one height."""
     shape: tuple[int, int] = canvas.shape[:2]
     height = max(_MINIMUM_LETTERS * unit, _LETTERS * math.hypot(*shape))
     if len(labels) > 1:

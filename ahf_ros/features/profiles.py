@@ -176,22 +176,21 @@ def _step_filters(group: int) -> _StepFilters:
     half, blur = float(_HALF_WIDTHS[index]), blur_steps * _BLUR_STEP
     along = half * _ALONG
     offsets = half * np.linspace(-_MAXIMUM_OFFSET, _MAXIMUM_OFFSET, _OFFSETS)
-    search, parts, sensitivity = [], [], []
-    for offset in offsets:
-        scaled = (along - offset) / blur
-        rise = 0.5 * (1 + np.array([erf(value / sqrt(2)) for value in scaled]))
-        density = np.exp(-0.5 * scaled**2) / (blur * sqrt(2 * pi))
-        light = (along - offset) * (_CONTRAST + (1 - _CONTRAST) * rise)
-        design = np.stack([1 - rise, rise, density, light, scaled * density], axis=1)
-        step = np.linalg.pinv(design[:, :3])
-        slope = np.linalg.pinv(design[:, :4])[3]
-        softness = np.linalg.pinv(design)[4]
-        rest = np.linalg.qr(design, mode='complete')[0][:, design.shape[1] :]
-        search.append([*np.linalg.qr(design[:, :2])[0].T, step[1] - step[0]])
-        parts.append(np.column_stack([step.T, slope, softness, rest]))
-        sensitivity.append(-(light @ step[2]) / (1 - _CONTRAST))
+    away = along - offsets[:, None]
+    scaled = away / blur
+    rise = 0.5 * (1 + np.vectorize(erf)(scaled / sqrt(2)))
+    density = np.exp(-0.5 * scaled**2) / (blur * sqrt(2 * pi))
+    light = away * (_CONTRAST + (1 - _CONTRAST) * rise)
+    design = np.stack([1 - rise, rise, density, light, scaled * density], axis=2)
+    step = np.linalg.pinv(design[..., :3])
+    slope, softness = np.linalg.pinv(design[..., :4])[:, 3:], np.linalg.pinv(design)[:, 4:]
+    bases = np.stack([np.linalg.qr(of, mode='complete')[0].T for of in design])
+    rest = bases[:, design.shape[2] :]
+    search = np.concatenate([bases[:, :2], step[:, 1:2] - step[:, :1]], axis=1)
+    parts = np.concatenate([step, slope, softness, rest], axis=1).swapaxes(1, 2)
+    sensitivity = -(light * step[:, 2]).sum(axis=1) / (1 - _CONTRAST)
     return _StepFilters(
-        np.array(search).transpose(2, 1, 0).reshape(_SAMPLES, -1).astype(np.float32),
-        np.array(parts, np.float32),
+        search.transpose(2, 1, 0).reshape(_SAMPLES, -1).astype(np.float32),
+        np.ascontiguousarray(parts, np.float32),
         np.stack([offsets, np.full(_OFFSETS, offsets[1] - offsets[0]), sensitivity]),
     )

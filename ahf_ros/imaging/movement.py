@@ -5,11 +5,13 @@ for in the second one, along its normal, with the same direction and about the s
 light that moved find no such partner in the same place, or find it displaced along their normal
 only. A scene that rests shows as a peak of coincidences at no displacement; its distance from zero
 is measured against its own uncertainty. Where nothing coincides at zero, but much does at another
-displacement, the scene moved by this.
+displacement, the scene moved by this. A pattern of light may look like that, so targets are
+witnesses.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import cv2
@@ -18,6 +20,7 @@ import numpy as np
 from ahf_ros.blas import one_blas_thread
 from ahf_ros.imaging.image import as_gray
 from ahf_ros.imaging.logarithm import LOG_OFFSET
+from ahf_ros.target import UNDECODED, Target
 
 _SIGNIFICANT = 6.0  # standard deviations from zero, a displacement that is movement
 _MINIMUM_EDGES = 60  # that coincide, for a displacement to be measured
@@ -49,6 +52,13 @@ _TILES = 4  # along each side, that are looked at one by one
 
 Gradients = tuple[np.ndarray, np.ndarray]
 """Of an image along x and y, float32, shape (height, width)."""
+
+
+_MINIMUM_TARGETS = 3  # targets that are in both images
+_STAYED = 0.5  # of a displacement: targets that moved less stayed where they were
+_MOVED_BY_LIGHT = 0.3  # px, by which light moves the centres of targets that stayed
+_SIGNIFICANT_MEDIAN = 4.0  # standard deviations of the median, a movement
+_OF_MEDIAN = 1.4826 * 1.2533  # from the median deviation to the deviation of the median of one
 
 
 @dataclass(frozen=True, slots=True)
@@ -350,3 +360,29 @@ def _far(edges: Edges, gradients: Gradients) -> Displacement | None:
     x, y = peak[1] - _REACH, peak[0] - _REACH
     rest = _measured(edges.normals, _partners(edges, gradients, x, y))
     return Displacement(rest.x + x, rest.y + y, rest.deviation) if rest else None
+
+
+def targets_moved(
+    moved: Displacement, before: Sequence[Target], after: Sequence[Target]
+) -> bool | None:
+    """Return whether targets moved that two images show; None if too few of them tell.
+
+    Only targets count that are where the displacement was seen.
+    """
+    others = {it.key: it for it in after if it.id != UNDECODED}
+    shifts = np.array(
+        [
+            (others[it.key].x - it.x, others[it.key].y - it.y)
+            for it in before
+            if it.key in others and moved.covers(it.x, it.y)
+        ]
+    )
+    if len(shifts) < _MINIMUM_TARGETS:
+        return None
+    middle = np.median(shifts, axis=0)
+    spread = np.median(np.abs(shifts - middle), axis=0) * _OF_MEDIAN / np.sqrt(len(shifts))
+    length, limit = np.hypot(*middle), min(_STAYED * np.hypot(moved.x, moved.y), _MOVED_BY_LIGHT)
+    deviation = np.hypot(*spread)
+    if length > limit:
+        return True if length > _SIGNIFICANT_MEDIAN * deviation else None
+    return False if deviation < limit else None

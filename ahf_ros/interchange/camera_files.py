@@ -15,6 +15,7 @@ from ruamel.yaml.error import YAMLError
 from ahf_ros.interchange.files import read_text
 from ahf_ros.orientation.camera import PARAMETERS
 from ahf_ros.orientation.network import FloatArray
+from ahf_ros.orientation.points import correlations, standard_deviations
 from ahf_ros.text import reason_of, shown
 
 BROWN = ('', 'plumb_bob', 'rational_polynomial')
@@ -131,8 +132,8 @@ def _rows(
         written('camera_matrix', matrix),
         written('distortion_coefficients', distortion[None]),
         f'parameters: [{", ".join(PARAMETERS)}]',
-        written('standard_deviations', _deviations(covariance)[None]),
-        written('correlations', _correlations(covariance)),
+        written('standard_deviations', standard_deviations(covariance)[None]),
+        written('correlations', correlations(covariance)),
     ]
 
 
@@ -144,17 +145,6 @@ def _opencv(calibration: FloatArray) -> tuple[FloatArray, FloatArray]:
         [[f * (1 + value['affinity']), 0, value['cx']], [0, f, value['cy']], [0, 0, 1]]
     )
     return matrix, np.array([value[it] for it in _COEFFICIENTS])
-
-
-def _deviations(covariance: FloatArray) -> FloatArray:
-    return np.sqrt(np.maximum(np.diag(covariance), 0))
-
-
-def _correlations(covariance: FloatArray) -> FloatArray:
-    """Return correlations, those of parameters that were kept fixed as 0."""
-    sigma = _deviations(covariance)
-    free = np.where(sigma > 0, sigma, 1)
-    return np.where(np.eye(len(sigma), dtype=bool), 1, covariance / np.multiply.outer(free, free))
 
 
 def _listed(matrix: FloatArray) -> str:

@@ -16,12 +16,11 @@ from ahf_ros.interchange.matching import Waiting
 from ahf_ros.msg import CodedTargetArray
 from ahf_ros.nodes.cloud import TargetPoints
 from ahf_ros.nodes.diagnostics import CloudTally, Tally
-from ahf_ros.nodes.image_msg import image_message
 from ahf_ros.nodes.inputs import Input
+from ahf_ros.nodes.messages import image_message, target_annotations, target_detections
 from ahf_ros.nodes.pipeline import Pipeline
 from ahf_ros.nodes.process import ProcessNode
 from ahf_ros.nodes.settings import DetectorNodeSettings
-from ahf_ros.nodes.target_msg import target_annotations, target_detections
 from ahf_ros.nodes.topics import ANSWERS_KEPT, CODED_TARGETS, DETECTIONS
 from ahf_ros.nodes.undistortion import UndistortedTargets
 from ahf_ros.stream import Answer

@@ -16,9 +16,9 @@ from ahf_ros.interchange.point_clouds import organised_points
 from ahf_ros.msg import CodedTargetArray
 from ahf_ros.nodes.diagnostics import CloudTally
 from ahf_ros.nodes.inputs import Input
+from ahf_ros.nodes.messages import target_labels, target_points
 from ahf_ros.nodes.process import LOG_PERIOD, ProcessNode
 from ahf_ros.nodes.settings import LOSSLESS, DetectorNodeSettings
-from ahf_ros.nodes.target_msg import target_labels, target_points
 from ahf_ros.nodes.topics import ANSWERS_KEPT, POINTS, TARGET_LABELS, TARGET_POINTS
 from ahf_ros.scans import located
 

@@ -18,15 +18,14 @@ from std_srvs.srv import Trigger
 
 from ahf_ros import ending
 from ahf_ros.nodes.answers import Answers
-from ahf_ros.nodes.diagnostics import Diagnostics, Tally
+from ahf_ros.nodes.diagnostics import PERIOD, Diagnostics, Tally, publish_status
 from ahf_ros.nodes.image_queue import ImageQueue, Worker
 from ahf_ros.nodes.inputs import Input
 from ahf_ros.nodes.parameters import ParameterSettings
 from ahf_ros.nodes.pipeline import STOPPING, Pipeline
-from ahf_ros.nodes.process import ProcessNode, run
+from ahf_ros.nodes.process import ProcessNode
 from ahf_ros.nodes.service_detector import ServiceDetector
 from ahf_ros.nodes.settings import LOSSLESS, SERVICE, DetectorNodeSettings
-from ahf_ros.nodes.status import PERIOD, publish_status
 from ahf_ros.nodes.topics import (
     CODED_TARGETS,
     IMAGE_TYPES,
@@ -267,8 +266,3 @@ class DetectorNode(ProcessNode, LifecycleNodeMixin):
             timeout = self._settings.current.image_timeout
             self._watch.look(self._images, timeout, self._answers.waiting())
         return self._diagnostics.status(PERIOD)
-
-
-def main(arguments: list[str] | None = None) -> int:
-    """Run the node."""
-    return run(DetectorNode, arguments)

@@ -1,24 +1,59 @@
-"""Diagnostics of the node `detector`."""
+"""The status of nodes on /diagnostics, and what the nodes `detector` and `pose` count."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable, Mapping
 from copy import copy
 from dataclasses import dataclass, field, replace
 
-from diagnostic_msgs.msg import DiagnosticStatus
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from std_msgs.msg import Header
 
 from ahf_ros.edge_shift import edge_shift_remark
 from ahf_ros.interchange.image_messages import nanoseconds
-from ahf_ros.nodes.status import status_of
+from ahf_ros.nodes.process import ProcessNode
 from ahf_ros.target import Identification
 from ahf_ros.text import printable
+
+PERIOD = 1.0
+"""Period of /diagnostics, s."""
+
 
 BEHIND = 10
 """Images dropped in a row after which identification is slower than the camera."""
 
 LOSS_REMEDY = 'more depth of the publisher, or config/fastdds_shm.xml on both sides, may help'
 """What to do about images that get lost, in words."""
+
+MISFIT = 3.0
+"""sigma0 from which on wrong weights alone do not explain residuals."""
+
+
+def publish_status(node: ProcessNode, what: str, status: Callable[[], DiagnosticStatus]) -> None:
+    """Publish what a function returns every `PERIOD` seconds, named after the node and `what`."""
+    publisher = node.publisher(DiagnosticArray, '/diagnostics', 10)
+    name = f'{node.get_fully_qualified_name().lstrip("/")}: {what}'
+
+    def publish() -> None:
+        # Before the counts, so that these are no older than the stamp.
+        header = Header(stamp=node.get_clock().now().to_msg())
+        found = status()
+        found.name = name
+        publisher.publish(DiagnosticArray(header=header, status=[found]))
+
+    node.every(PERIOD, publish)
+
+
+def status_of(
+    reports: Iterable[object], otherwise: str, values: Mapping[str, object]
+) -> DiagnosticStatus:
+    """Return a warning of all reports that are not empty; without any, the other message."""
+    warning = '; '.join(str(text) for text in reports if text)
+    return DiagnosticStatus(
+        level=DiagnosticStatus.WARN if warning else DiagnosticStatus.OK,
+        message=warning or otherwise,
+        values=[KeyValue(key=key, value=str(value)) for key, value in values.items()],
+    )
 
 
 @dataclass(slots=True)
@@ -136,7 +171,7 @@ class Diagnostics:
         tally = replace(self._tally)
         before, self._before = self._before, replace(tally, clouds=copy(tally.clouds))
         answered = tally.answered - before.answered
-        reports, message = _reports(tally, before), f'{answered} images identified'
+        reports, message = _reports_of_images(tally, before), f'{answered} images identified'
         if tally.inactive:
             reports, message = (), f'the node is {tally.inactive}'
         unknown = f', not counted: {tally.lost_unknown}' if tally.lost_unknown else ''
@@ -171,7 +206,7 @@ class Diagnostics:
         return status_of(reports, message, values)
 
 
-def _reports(tally: Tally, before: Tally) -> tuple[object, ...]:
+def _reports_of_images(tally: Tally, before: Tally) -> tuple[object, ...]:
     """Return everything that is wrong since the last status, and empty texts and zeros."""
     clouds, clouds_before = tally.clouds or CloudTally(), before.clouds or CloudTally()
     rejected = tally.rejected - before.rejected
@@ -204,3 +239,81 @@ def _reports(tally: Tally, before: Tally) -> tuple[object, ...]:
 def seconds(stamp: int) -> str:
     """Return a stamp, ns, in words."""
     return f'{stamp // 10**9}.{stamp % 10**9:09} s'
+
+
+@dataclass(slots=True)
+class PoseTally(Stamps):
+    """Counts of images since the start, and what is to be said; texts are empty if nothing is."""
+
+    received: int = 0
+    published: int = 0
+    refused: int = 0  # without a pose
+    reason: str = ''  # of the last of them
+    ambiguous: int = 0  # with a second pose that fits about as well
+    lost: int = 0  # in transport
+    wrong: int = 0  # images with targets that do not agree
+    rejected: str = ''  # names of the last of them, and why
+    unknown: str = ''  # IDs of the last image that have no coordinates
+    used: int = 0  # targets of the last pose
+    sigma0: float = 0.0
+    latency: float = 0.0  # from the arrival of the last message to its pose, s
+    no_tf: str = ''  # why there is no tf
+    rectified: str = ''  # message about images that are, or are not, rectified
+    uncalibrated: str = ''  # why no camera_info arrives
+    mistaken: str = ''  # message about other types on the topic
+    silent: str = ''  # message about targets that do not arrive
+
+
+class PoseDiagnostics:
+    """Turns a tally into one status per period, with the rate and the level of the period."""
+
+    def __init__(self, tally: PoseTally) -> None:
+        self._tally = tally
+        self._before = replace(tally)
+
+    def status(self, period: float) -> DiagnosticStatus:
+        """Return the status of the last `period` seconds."""
+        tally, before = replace(self._tally), self._before
+        self._before = tally
+        published = tally.published - before.published
+        values = {
+            'rate (Hz)': f'{published / period:.2f}',
+            'latency (s)': f'{tally.latency:.4f}',
+            'received': tally.received,
+            'published': tally.published,
+            'not determined': tally.refused,
+            'last reason': tally.reason,
+            'ambiguous': tally.ambiguous,
+            'lost in transport': tally.lost,
+            'stamps that went backwards': tally.backwards,
+            'images with targets left out': tally.wrong,
+            'last targets left out': tally.rejected,
+            'IDs without coordinates': tally.unknown,
+            'targets used': tally.used,
+            'sigma0': f'{tally.sigma0:.2f}',
+        }
+        return status_of(_reports_of_poses(tally, before), f'{published} poses', values)
+
+
+def _reports_of_poses(tally: PoseTally, before: PoseTally) -> tuple[object, ...]:
+    """Return everything that is wrong since the last status, and empty texts and zeros."""
+    refused = tally.refused - before.refused
+    ambiguous = tally.ambiguous - before.ambiguous
+    backwards, wrong = tally.backwards - before.backwards, tally.wrong - before.wrong
+    lost = tally.lost - before.lost
+    misfit = tally.published > before.published and tally.sigma0 > MISFIT
+    return (
+        tally.mistaken,
+        not tally.mistaken and tally.silent,
+        tally.uncalibrated,
+        refused and f'{refused} images without a pose: {tally.reason}',
+        tally.no_tf,
+        ambiguous and f'{ambiguous} images with a second pose that fits about as well',
+        wrong and f'targets left out in {wrong} images, in the last: {tally.rejected}',
+        misfit
+        and f'image points fit {tally.sigma0:.0f} times worse than their covariances say: wrong '
+        'calibration, camera_matrix or coordinates',
+        tally.rectified,
+        backwards and f'{backwards} stamps went backwards',
+        lost and f'{lost} messages were lost in transport; {LOSS_REMEDY}',
+    )

@@ -14,9 +14,9 @@ from std_msgs.msg import Header
 from ahf_ros import msg
 from ahf_ros.interchange.target_messages import coded_target_array
 from ahf_ros.msg import CodedTargetArray
-from ahf_ros.nodes.image_msg import image_message
+from ahf_ros.nodes.messages import image_message
 from ahf_ros.nodes.parameters import ParameterSettings
-from ahf_ros.nodes.process import ProcessNode, run
+from ahf_ros.nodes.process import ProcessNode
 from ahf_ros.nodes.settings import IlluminationNodeSettings
 from ahf_ros.synthetic.scene import Rendering, SceneSettings, render
 from ahf_ros.target import Identification
@@ -110,8 +110,3 @@ def camera_info(rendering: Rendering) -> CameraInfo:
         r=np.eye(3).ravel(),
         p=projection.ravel(),
     )
-
-
-def main(arguments: list[str] | None = None) -> int:
-    """Run the node."""
-    return run(IlluminationNode, arguments)

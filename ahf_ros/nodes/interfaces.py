@@ -10,10 +10,10 @@ import textwrap
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from ahf_ros.nodes.pose_settings import PoseNodeSettings
 from ahf_ros.nodes.settings import (
     DetectorNodeSettings,
     IlluminationNodeSettings,
+    PoseNodeSettings,
     RegistrationNodeSettings,
     ScoreboardSettings,
 )

@@ -121,7 +121,6 @@ def _argument(item: Parameter) -> DeclareLaunchArgument:
 
 
 def _item(node: str, name: str) -> Parameter:
-    """Return a parameter of a node."""
     if name == _SIM_TIME.name:
         return _SIM_TIME
     return next(it for it in flat_parameters(NODES[node].settings) if it.name == name)
@@ -199,7 +198,6 @@ def without_effect(given: Mapping[str, str]) -> list[LogInfo]:
 
 
 def _topics(given: Mapping[str, str], driver: Driver | None) -> tuple[str, str]:
-    """Return the topics of images and clouds."""
     image, points = given.get('image', ''), given.get('points', '')
     if driver:
         return image or driver.image, points or driver.points

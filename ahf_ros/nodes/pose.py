@@ -21,18 +21,17 @@ from ahf_ros.interchange.coordinate_files import read_coordinates
 from ahf_ros.interchange.image_messages import nanoseconds
 from ahf_ros.interchange.target_messages import identification_from
 from ahf_ros.msg import CodedTargetArray
-from ahf_ros.nodes.parameters import ParameterSettings
-from ahf_ros.nodes.pose_diagnostics import PoseDiagnostics, PoseTally
-from ahf_ros.nodes.pose_msg import (
+from ahf_ros.nodes.diagnostics import PERIOD, PoseDiagnostics, PoseTally, publish_status
+from ahf_ros.nodes.messages import (
     PosedTarget,
     detections_message,
     pose_message,
     target_transform,
     transform_message,
 )
-from ahf_ros.nodes.pose_settings import CAMERA, NONE, PoseNodeSettings
-from ahf_ros.nodes.process import LOG_PERIOD, ProcessNode, run
-from ahf_ros.nodes.status import PERIOD, publish_status
+from ahf_ros.nodes.parameters import ParameterSettings
+from ahf_ros.nodes.process import LOG_PERIOD, ProcessNode
+from ahf_ros.nodes.settings import CAMERA, NONE, PoseNodeSettings
 from ahf_ros.nodes.tf import Frames
 from ahf_ros.nodes.topics import ANSWERS_KEPT, DETECTIONS
 from ahf_ros.nodes.undistortion import Calibrations
@@ -280,8 +279,3 @@ def _turn(pose: Pose) -> float:
     if pose.second is None:
         return 0.0
     return float(np.degrees(np.linalg.norm(pose.second.step_from(pose.camera)[3:])))
-
-
-def main(arguments: list[str] | None = None) -> int:
-    """Run the node."""
-    return run(PoseNode, arguments)

@@ -20,17 +20,18 @@ from std_srvs.srv import Trigger
 from ahf_ros.interchange.image_messages import nanoseconds
 from ahf_ros.interchange.matching import ANSWER, ANSWERS, CLOUD, WAITING_MEMORY, Matcher
 from ahf_ros.interchange.point_clouds import whole_points
-from ahf_ros.interchange.registration_files import ScanRecord, write_registration
-from ahf_ros.nodes.parameters import ParameterSettings
-from ahf_ros.nodes.pose_msg import pose_message, transform_message
-from ahf_ros.nodes.process import LOG_PERIOD, ProcessNode, run
-from ahf_ros.nodes.registration_msg import (
+from ahf_ros.interchange.registration_files import ScanRecord, in_common_frame, write_registration
+from ahf_ros.nodes.diagnostics import publish_status, status_of
+from ahf_ros.nodes.messages import (
+    cloud_message,
     field_points,
-    moved_cloud,
+    pose_message,
     residual_points,
+    transform_message,
 )
+from ahf_ros.nodes.parameters import ParameterSettings
+from ahf_ros.nodes.process import LOG_PERIOD, ProcessNode
 from ahf_ros.nodes.settings import RegistrationNodeSettings
-from ahf_ros.nodes.status import publish_status, status_of
 from ahf_ros.nodes.tf import PACKAGE, Frames
 from ahf_ros.nodes.topics import ANSWERS_KEPT, POINTS
 from ahf_ros.scans import Scans, known_targets, scan_cloud
@@ -157,7 +158,8 @@ class RegistrationNode(ProcessNode):
             self._refuse_cloud(str(error))
             return
         scan = self._registration.field.scans[self._registration.records.index(record)]
-        self._cloud.publish(moved_cloud(points, scan.transform, self._header(record)))
+        moved = in_common_frame(points, scan.transform)
+        self._cloud.publish(cloud_message(moved, self._header(record)))
         self._tally.clouds += 1
         used = sum(it.nbytes for it in self._clouds.values())
         if used + points.nbytes > self._settings.current.cloud_memory * 2**20:
@@ -181,7 +183,6 @@ class RegistrationNode(ProcessNode):
         return Header(stamp=stamp, frame_id=self._settings.current.frame)
 
     def _publish(self, number: int) -> None:
-        """Publish transform and residuals of a scan."""
         field, header = self._registration.field, self._header(self._registration.records[number])
         scan = field.scans[number]
         self._transform.publish(pose_message(scan.transform, header))
@@ -292,8 +293,3 @@ class RegistrationNode(ProcessNode):
             }
         registered = f'{counted(len(field.scans), "scan")} registered'
         return status_of(reports, registered, values)
-
-
-def main(arguments: list[str] | None = None) -> int:
-    """Run the node."""
-    return run(RegistrationNode, arguments)

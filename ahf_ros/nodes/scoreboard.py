@@ -7,7 +7,7 @@ from ahf_ros.interchange.image_messages import nanoseconds
 from ahf_ros.interchange.target_messages import identification_from
 from ahf_ros.msg import CodedTargetArray
 from ahf_ros.nodes.parameters import ParameterSettings
-from ahf_ros.nodes.process import ProcessNode, run
+from ahf_ros.nodes.process import ProcessNode
 from ahf_ros.nodes.settings import ScoreboardSettings
 
 KEPT = 1000
@@ -45,8 +45,3 @@ class Scoreboard(ProcessNode):
         print(f'image {self._count}: {words}', flush=True)
         if self._count == images:
             self.ended.set_result(0)
-
-
-def main(arguments: list[str] | None = None) -> int:
-    """Run the node."""
-    return run(Scoreboard, arguments)

@@ -15,7 +15,7 @@ from rclpy.task import Future
 from std_msgs.msg import Header
 
 from ahf_ros.interchange.target_messages import identification_from
-from ahf_ros.nodes.image_msg import image_message
+from ahf_ros.nodes.messages import image_message
 from ahf_ros.nodes.pipeline import Stopping
 from ahf_ros.srv import Identify
 from ahf_ros.target import Target

@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import sys
 from functools import partial
-from importlib import import_module
+from pkgutil import resolve_name
 
 from ahf_ros.ending import has_arrived, ignore_ending, signalled
 from ahf_ros.text import printable
 
 NODES = {
-    'detector': 'ahf_ros.nodes.detector',
-    'illumination': 'ahf_ros.nodes.illumination',
-    'pose': 'ahf_ros.nodes.pose',
-    'registration': 'ahf_ros.nodes.registration',
-    'scoreboard': 'ahf_ros.nodes.scoreboard',
+    'detector': 'ahf_ros.nodes.detector:DetectorNode',
+    'illumination': 'ahf_ros.nodes.illumination:IlluminationNode',
+    'pose': 'ahf_ros.nodes.pose:PoseNode',
+    'registration': 'ahf_ros.nodes.registration:RegistrationNode',
+    'scoreboard': 'ahf_ros.nodes.scoreboard:Scoreboard',
 }
-"""Modules whose `main` runs a node, by the name of the node."""
+"""Modules and classes of the nodes."""
 
 INSTALL = (
     'nodes need ROS 2: source an installation, or install it from PyPI in the sources of ahf_ros '
@@ -40,7 +40,8 @@ def start(node: str, arguments: list[str] | None = None) -> int:
         print(help_text(node), end='')
         return 0
     try:
-        module = import_module(NODES[node])
+        node_class = resolve_name(NODES[node])
+        from ahf_ros.nodes.process import run
     except ModuleNotFoundError as error:
         print(f'ahf_{node}: {error.name} is missing, {INSTALL}', file=sys.stderr)
         return 1
@@ -51,8 +52,7 @@ def start(node: str, arguments: list[str] | None = None) -> int:
     if has_arrived():
         ignore_ending()
         return 0
-    status: int = module.main(arguments)
-    return status
+    return run(node_class, arguments)
 
 
 detector, illumination, pose, registration, scoreboard = (partial(start, node) for node in NODES)

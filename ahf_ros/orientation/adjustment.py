@@ -11,7 +11,6 @@ from ahf_ros.blas import one_blas_thread
 from ahf_ros.orientation import normals
 from ahf_ros.orientation.calibration import released
 from ahf_ros.orientation.camera import PARAMETERS
-from ahf_ros.orientation.checks import check_network
 from ahf_ros.orientation.datum import Datum
 from ahf_ros.orientation.knowledge import gathered, kind, knowledge
 from ahf_ros.orientation.least_squares import (
@@ -19,7 +18,7 @@ from ahf_ros.orientation.least_squares import (
     minimise,
     normal_equations,
 )
-from ahf_ros.orientation.network import FloatArray, IntArray, Network, Rejection
+from ahf_ros.orientation.network import FloatArray, IntArray, Network, Rejection, check_network
 from ahf_ros.orientation.normals import Layout
 from ahf_ros.orientation.placing import placed
 from ahf_ros.orientation.precision import precision

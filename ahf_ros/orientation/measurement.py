@@ -15,7 +15,7 @@ import numpy as np
 
 from ahf_ros.orientation.alignment import Alignment
 from ahf_ros.orientation.network import FloatArray
-from ahf_ros.orientation.points import MeasuredPoints, blocks, entries
+from ahf_ros.orientation.points import MeasuredPoints, blocks, entries, standard_deviations
 from ahf_ros.text import counted
 
 LINES, LENGTHS_A_LINE, SHARE_OF_DIAGONAL = 7, 5, 2 / 3
@@ -51,7 +51,7 @@ class Deviation:
     @property
     def sigmas(self) -> FloatArray:
         """Standard deviations in x, y and z."""
-        return np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
+        return standard_deviations(self.covariance)
 
 
 @dataclass(frozen=True)

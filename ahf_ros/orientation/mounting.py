@@ -235,7 +235,6 @@ class _Model:
         return residuals, rows, covariances
 
     def _adjust(self) -> None:
-        """Iterate Gauss-Newton steps until they are small."""
         for _ in range(_ROUNDS):
             residuals, rows, covariances = self._equations()
             normal = np.zeros((self.unknowns, self.unknowns))

@@ -364,11 +364,17 @@ def products(left: FloatArray, right: FloatArray) -> FloatArray:
 
 
 def bordered(reduced: Reduced, border: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the scaled and bordered matrix, and the sizes (h,) that its border had."""
+    """Return the scaled and bordered matrix, and the sizes (h,) that its border had.
+
+    Columns of the border that depend on each other are a LinAlgError: of the singular matrix that
+    they would make, rounding decides whether it can be solved.
+    """
     scale = reduced.scale
     columns = scale[:, None] * border
     size = np.linalg.norm(columns, axis=0)
     columns = columns / size
+    if columns.size and np.linalg.matrix_rank(columns) < len(size):
+        raise np.linalg.LinAlgError('columns of the border depend on each other')
     empty = np.zeros((border.shape[1], border.shape[1]))
     scaled = scale[:, None] * reduced.matrix * scale
     return np.block([[scaled, columns], [columns.T, empty]]), size

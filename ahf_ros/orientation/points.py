@@ -21,6 +21,19 @@ def blocks(covariance: FloatArray) -> FloatArray:
     return own
 
 
+def standard_deviations(covariance: FloatArray) -> FloatArray:
+    """Return the square roots of the diagonal, where rounding may leave less than zero."""
+    deviations: FloatArray = np.sqrt(np.maximum(np.diag(covariance), 0))
+    return deviations
+
+
+def correlations(covariance: FloatArray) -> FloatArray:
+    """Return correlations, those of parameters that were kept fixed as 0."""
+    sigma = standard_deviations(covariance)
+    free = np.where(sigma > 0, sigma, 1)
+    return np.where(np.eye(len(sigma), dtype=bool), 1, covariance / np.multiply.outer(free, free))
+
+
 def entries(rows: Sequence[int] | IntArray) -> IntArray:
     """Return the rows of coordinates, (3n,), of the rows of points."""
     return np.ravel(3 * np.asarray(rows, np.int64)[:, None] + np.arange(3))

@@ -1,4 +1,7 @@
-"""The light adjustment, robust and without covariances, for the search of approximate values."""
+"""The light adjustment, robust and without covariances, for the search of approximate values.
+
+What is usual of lenses is an observation, while nothing better is known of a camera.
+"""
 
 from __future__ import annotations
 
@@ -8,18 +11,28 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ahf_ros.orientation import normals
-from ahf_ros.orientation.camera import PARAMETERS
-from ahf_ros.orientation.least_squares import minimise
-from ahf_ros.orientation.network import Network
+from ahf_ros.orientation.camera import PARAMETERS, known_calibration
+from ahf_ros.orientation.datum import movements
+from ahf_ros.orientation.least_squares import Conditions, Knowledge, minimise
+from ahf_ros.orientation.network import FloatArray, IntArray, Network
 from ahf_ros.orientation.normals import Layout
 from ahf_ros.orientation.solution import Start
-from ahf_ros.orientation.usual_lens import usual_lens
 
 _AGREES = 5.0  # standard deviations, or robust ones, of an observation that agrees
 NEEDED = (
     'no used observation has a pose and a point in front of it, expected photographs with three '
     'points and points with two rays'
 )
+
+
+USUAL = {'k1': 0.2, 'k2': 0.2, 'k3': 0.2, 'p1': 0.003, 'p2': 0.003}
+"""Standard deviations of what lenses have, about zero."""
+
+FOCAL_LENGTH = 0.05
+"""Relative standard deviation of a focal length that is given: makers round it."""
+
+OFF_CENTRE = 0.02
+"""Standard deviation of a principal point about the centre, in widths of the image."""
 
 
 def refine(
@@ -65,3 +78,41 @@ def agreeing(network: Network, state: Start, adjusted: Layout) -> NDArray[np.boo
     used = np.zeros(len(network.observations.xy), dtype=bool)
     used[every.observations[lengths < _AGREES * spread]] = True
     return used
+
+
+def usual_lens(network: Network, layout: Layout) -> Knowledge:
+    """Return conditions that hold the frame, and keep free parameters of lenses about as usual.
+
+    So few photographs never make a lens that does not exist.
+    """
+    columns, middles, sigmas = _expected(network, layout)
+
+    def conditions(state: Start) -> Conditions:
+        rows = np.zeros((7 + len(columns), layout.unknowns))
+        rows[:7, : 3 * len(layout.points)] = movements(state.points[layout.points]).T
+        rows[7 + np.arange(len(columns)), columns] = 1
+        gaps = middles - state.calibrations[layout.free][columns - 3 * len(layout.points)]
+        return Conditions(
+            rows, np.concatenate([np.zeros(7), gaps]), np.concatenate([np.zeros(7), sigmas**2])
+        )
+
+    return conditions
+
+
+def _expected(network: Network, layout: Layout) -> tuple[IntArray, FloatArray, FloatArray]:
+    """Return columns, expected values and standard deviations of free parameters of lenses.
+
+    What is given of a camera is expected of it.
+    """
+    expected = []
+    for camera, column in zip(network.cameras, layout.columns, strict=True):
+        middle = known_calibration(camera)
+        off = OFF_CENTRE * max(camera.width, camera.height)
+        sigmas = USUAL | {'f': FOCAL_LENGTH * middle[0], 'cx': off, 'cy': off}
+        expected += [
+            (column[place], middle[place], sigmas[name])
+            for place, name in enumerate(PARAMETERS)
+            if column[place] >= 0 and np.isfinite(sigmas.get(name, np.nan))
+        ]
+    columns, middles, deviations = np.array(expected).reshape(-1, 3).T
+    return columns.astype(int), middles, deviations

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ahf_ros.orientation.camera import rotation_matrices
 from ahf_ros.orientation.network import FloatArray
 from ahf_ros.orientation.planar import is_flat, planar_poses
+from ahf_ros.orientation.triangulation import errors
 
 FEWEST_POINTS = 4
 """Known points of a photograph that is oriented: three leave four poses, the fourth decides."""
@@ -62,7 +63,7 @@ def resections(points: FloatArray, xy: FloatArray, sigma: FloatArray) -> list[Re
     if not candidates:
         return []
     rotations, positions = (np.array(part) for part in zip(*candidates, strict=True))
-    ratio = _errors(rotations, positions, points, xy) / sigma
+    ratio = errors(points, rotations[:, None], positions[:, None], xy) / sigma
     enough = _half(len(points))
     scores = np.partition(ratio, enough - 1, axis=1)[:, enough - 1]
     ordered = (candidates[index] for index in np.argsort(scores, kind='stable'))
@@ -94,16 +95,6 @@ def _sampled(points: FloatArray, xy: FloatArray) -> Iterable[Pose]:
             position = -rotation.T @ shift.ravel()
             if np.isfinite(rotation).all() and np.isfinite(position).all():
                 yield rotation, position
-
-
-def _errors(
-    rotations: FloatArray, positions: FloatArray, points: FloatArray, xy: FloatArray
-) -> FloatArray:
-    """Return distances (poses, n) in normalised coordinates, infinite behind the camera."""
-    seen = np.einsum('kij,knj->kni', rotations, points - positions[:, None])
-    with np.errstate(divide='ignore', invalid='ignore'):
-        distance = np.linalg.norm(seen[..., :2] / seen[..., 2:] - xy, axis=-1)
-    return np.where(seen[..., 2] > 0, distance, np.inf)
 
 
 def _distinct(poses: Iterable[Pose], points: FloatArray, least: float, most: int) -> list[Pose]:
@@ -181,7 +172,7 @@ def _rated(
     sigma: FloatArray,
 ) -> Resection:
     """Return the pose with what agrees with it."""
-    ratio = _errors(rotation[None], position[None], points, xy)[0] / sigma
+    ratio = errors(points, rotation, position, xy) / sigma
     enough = _half(len(points))
     scale = float(np.partition(ratio, enough - 1)[enough - 1]) / np.sqrt(2 * np.log(2))
     bounded = np.minimum(ratio, BOUND * max(scale, 1.0))

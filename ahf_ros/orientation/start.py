@@ -221,7 +221,6 @@ def _pose(
 def _poses(
     view: View, start: Start, seen: FloatArray, calibration: FloatArray, spread: float
 ) -> list[Resection]:
-    """Return the poses of a photograph with a calibration."""
     calibrations = start.calibrations.copy()
     calibrations[view.camera] = calibration
     xy, sigma = view.normalised(calibrations)

@@ -18,12 +18,11 @@ from ahf_ros.orientation.network import FloatArray, IntArray, Network, part_of
 from ahf_ros.orientation.normals import BEHIND
 from ahf_ros.orientation.planar import mirrored
 from ahf_ros.orientation.precision import precision
-from ahf_ros.orientation.refinement import free_parameters, refine
+from ahf_ros.orientation.refinement import free_parameters, refine, usual_lens
 from ahf_ros.orientation.relative import relative_orientations
 from ahf_ros.orientation.resection import resections
 from ahf_ros.orientation.solution import Start
 from ahf_ros.orientation.triangulation import SMALLEST_ANGLE, directions, midpoints
-from ahf_ros.orientation.usual_lens import usual_lens
 from ahf_ros.orientation.views import View, largest_angles, lengths_of, spread_of
 
 STEPS = np.geomspace(0.5, 4.0, 14)

@@ -107,7 +107,6 @@ def pdf_bytes(pages: Iterable[Drawing], title: str) -> bytes:
 
 
 def _pdf_path(canvas: Any, ink: Ink) -> Any:
-    """Return the outlines of a target."""
     path = canvas.beginPath()
     for contour in ink.contours:
         go_to = path.moveTo

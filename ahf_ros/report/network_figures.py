@@ -8,7 +8,7 @@ from html import escape
 
 import numpy as np
 
-from ahf_ros.drawing.coordinates import apart, ellipse, round_number
+from ahf_ros.drawing.coordinates import apart, ellipse, principal_axes, round_number
 from ahf_ros.orientation.network import FloatArray
 from ahf_ros.orientation.solution import Solution
 
@@ -126,13 +126,9 @@ def _axes(solution: Solution) -> tuple[FloatArray, tuple[str, str, str]]:
     points = solution.start.points[solution.determined]
     if solution.network.control or len(points) < 3:
         return np.eye(3), ('x', 'y', 'z')
-    axes = np.linalg.svd(points - points.mean(axis=0), full_matrices=True)[2].copy()
     cameras = solution.start.positions[solution.oriented]
-    if len(cameras) and (cameras.mean(axis=0) - points.mean(axis=0)) @ axes[2] < 0:
-        axes[2] *= -1
-    if np.linalg.det(axes) < 0:
-        axes[1] *= -1
-    return axes, ('length', 'width', 'height')
+    towards = cameras.mean(axis=0) - points.mean(axis=0) if len(cameras) else np.zeros(3)
+    return principal_axes(points, towards), ('length', 'width', 'height')
 
 
 def _view(solution: Solution, axes: FloatArray, with_cameras: bool) -> tuple[str, float, float]:

@@ -9,6 +9,7 @@ import numpy as np
 
 from ahf_ros.interchange.files import write_whole
 from ahf_ros.orientation.camera import PARAMETERS
+from ahf_ros.orientation.points import correlations, standard_deviations
 from ahf_ros.orientation.solution import Solution
 from ahf_ros.orientation.strength import (
     FEW_RAYS,
@@ -76,7 +77,7 @@ def _targets(solution: Solution) -> list[dict[str, Any]]:
     known, rays = solution.determined, rays_of(solution)
     angles = largest_angles(solution.network, solution.start)
     axes = semi_axes(solution)
-    sigmas = np.sqrt(np.maximum(np.diag(solution.covariance_of_points), 0)).reshape(-1, 3)
+    sigmas = standard_deviations(solution.covariance_of_points).reshape(-1, 3)
     longest = np.nanmax(axes[:, 0], initial=0) or 1.0
     return [
         {
@@ -119,19 +120,13 @@ def _cameras(solution: Solution, enlarged: float) -> list[dict[str, Any]]:
     cameras = []
     for index in np.flatnonzero(solution.calibrated).tolist():
         view = solution.network.cameras[index]
-        sigma = np.sqrt(np.maximum(np.diag(solution.camera_covariances[index]), 0))
+        correlation = correlations(solution.camera_covariances[index])
         free = [PARAMETERS.index(name) for name in solution.released[index]]
         correlated = [
-            (PARAMETERS[first], PARAMETERS[second], correlation)
+            (PARAMETERS[first], PARAMETERS[second], correlation[first, second])
             for place, first in enumerate(free)
             for second in free[:place]
-            if sigma[first] > 0
-            and sigma[second] > 0
-            and abs(
-                correlation := solution.camera_covariances[index][first, second]
-                / (sigma[first] * sigma[second])
-            )
-            > _CORRELATED
+            if abs(correlation[first, second]) > _CORRELATED
         ]
         cameras.append(
             {

@@ -9,6 +9,7 @@ import numpy as np
 from ahf_ros.interchange.network_results import rejections
 from ahf_ros.orientation.camera import PARAMETERS
 from ahf_ros.orientation.deviations import bar_deviations, control_deviations
+from ahf_ros.orientation.points import standard_deviations
 from ahf_ros.orientation.solution import Solution
 from ahf_ros.orientation.strength import rays_of, semi_axes
 from ahf_ros.orientation.views import largest_angles
@@ -57,7 +58,7 @@ def _of(chosen: np.ndarray) -> str:
 def camera_rows(solution: Solution, camera: int) -> Rows:
     """Return parameters, their values and standard deviations, of a calibrated camera."""
     rows = []
-    sigmas = np.sqrt(np.maximum(np.diag(solution.camera_covariances[camera]), 0))
+    sigmas = standard_deviations(solution.camera_covariances[camera])
     values = solution.start.calibrations[camera]
     for name, value, sigma in zip(PARAMETERS, values, sigmas, strict=True):
         called = f'{name}, px' if name in _IN_PX else name

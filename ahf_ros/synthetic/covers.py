@@ -306,7 +306,6 @@ def _draw_disc(stamp: np.ndarray, radius: float, shade: int) -> None:
 
 
 def _draw_dot(stamp: np.ndarray, _generator: np.random.Generator) -> None:
-    """Draw an uncoded target."""
     _draw_disc(stamp, 0.95, 255)
 
 
@@ -317,7 +316,6 @@ def _draw_ring(stamp: np.ndarray, generator: np.random.Generator) -> None:
 
 
 def _draw_text(stamp: np.ndarray, generator: np.random.Generator) -> None:
-    """Draw one to three lines of capital letters and digits."""
     characters = np.array(list(string.ascii_uppercase + string.digits))
     count = int(generator.integers(1, 4))
     height = 1.3 / count

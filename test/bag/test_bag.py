@@ -28,6 +28,9 @@ PATIENCE = 300.0
 SEARCH = ('--detector', 'traditional', '--expected', '4', '--population', '6')
 """A detector that needs a filter for what `bags.scenes` shows."""
 
+FAMILY = ('--family', 'metashape12')
+"""Where it does not matter what is found: `auto` takes several times as long."""
+
 UNFINISHED = """
 import sys, time
 from ahf_ros.bag import run
@@ -100,14 +103,6 @@ def test_answers_are_beside_everything_else(recording: Path, answered: Path) -> 
     assert {message.filter.duration for _, message in found} == {0.0}
 
 
-def test_answers_are_true(scenes: list[Rendering], recording: Path, tmp_path: Path) -> None:
-    assert status(recording, tmp_path / 'out') == 0
-    for scene, (_, message) in zip(scenes, bags.answers(tmp_path / 'out'), strict=True):
-        assert [it.id for it in message.targets] == [it.id for it in scene.targets]
-        for one, true in zip(message.targets, scene.targets, strict=True):
-            assert (one.x, one.y) == pytest.approx((true.x, true.y), abs=0.2)
-
-
 @pytest.mark.parametrize('storage', ['mcap', 'sqlite3'])
 def test_all_storages_give_the_same(
     messages: list[bags.Recorded], answered: Path, tmp_path: Path, storage: str
@@ -127,7 +122,7 @@ def test_compressed_bags_are_read(images: list[np.ndarray], tmp_path: Path, mode
         connection = writer.add_connection('/image', IMAGE, typestore=store)
         message = bags.image(store, images[0], 10**9)
         writer.write(connection, 10**9, bytes(store.serialize_cdr(message, IMAGE)))
-    assert status(tmp_path / 'in', tmp_path / 'out') == 0
+    assert status(tmp_path / 'in', tmp_path / 'out', *FAMILY) == 0
     assert len(bags.answers(tmp_path / 'out')) == 1
 
 
@@ -148,7 +143,7 @@ def test_topics_are_chosen_and_compressed_images_are_images_too(
     png = bags.compressed(store, images[0], 10**9)
     messages.append(('/left/compressed', COMPRESSED_IMAGE, 10**9, png))
     source = bags.write_ros2(tmp_path / 'in', sorted(messages, key=lambda it: it[2]))
-    assert status(source, tmp_path / 'all', '--output-topic', 'targets') == 0
+    assert status(source, tmp_path / 'all', '--output-topic', 'targets', *FAMILY) == 0
     left, right, same = (
         bags.answers(tmp_path / 'all', f'{topic}/targets')
         for topic in ('/left', '/right', '/left/compressed')
@@ -156,7 +151,7 @@ def test_topics_are_chosen_and_compressed_images_are_images_too(
     assert (len(left), len(right), len(same)) == (2, 2, 1)
     assert [it.id for it in same[0][1].targets] == [it.id for it in left[0][1].targets]
     one = tmp_path / 'one'
-    assert status(source, one, '--topic', '/right', '--output-topic', '/targets') == 0
+    assert status(source, one, '--topic', '/right', '--output-topic', '/targets', *FAMILY) == 0
     ids = [[it.id for it in message.targets] for _, message in bags.answers(one, '/targets')]
     assert ids == [[it.id for it in message.targets] for _, message in right]
 
@@ -236,11 +231,11 @@ def test_what_is_refused_is_named_and_the_others_go_on(
     messages[2][3].height = 10**6
     source = bags.write_ros2(tmp_path / 'in', messages)
     for _ in range(2):  # the second run finds it done, and says the same
-        assert status(source, tmp_path / 'out') == 1
+        assert status(source, tmp_path / 'out', *FAMILY) == 1
         errors = capfd.readouterr().err
         assert '4 images answered, 2 of them not accepted' in errors
         assert 'is not tried again; to do so, remove this bag or name another one' in errors
-    assert status(source, tmp_path / 'new') == 1
+    assert status(source, tmp_path / 'new', *FAMILY) == 1
     errors = capfd.readouterr().err
     assert "/image at 1700000000.000000002 s: encoding is 'unheard of', accepted is" in errors
     assert '/image at 1700000000.000000003 s: ' in errors
@@ -317,7 +312,7 @@ def test_bags_that_are_none_are_named_and_the_others_go_on(
     bags.write_ros2(tmp_path / 'notes', notes)
     bad = [tmp_path / name for name in ('text.mcap', 'text.bag', 'empty', 'notes', 'missing')]
     bad[1] = bad[1].rename(tmp_path / 'other.bag')
-    assert status(*bad, recording, tmp_path / 'made') == 1
+    assert status(*bad, recording, tmp_path / 'made', *FAMILY) == 1
     errors = capfd.readouterr().err
     for path in bad:
         assert f'ahf bag: {path} ' in errors
@@ -362,17 +357,3 @@ def test_bags_of_one_name_are_refused(
 ) -> None:
     assert status(recording, recording, tmp_path / 'made') == 2
     assert 'several bags of the same name' in capfd.readouterr().err
-
-
-def test_a_missing_library_is_named(
-    recording: Path,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capfd: pytest.CaptureFixture[str],
-) -> None:
-    monkeypatch.setitem(sys.modules, 'rosbags', None)
-    assert status(recording, tmp_path / 'out') == 2
-    assert (
-        "rosbags not installed, needed for ahf bag: pip install 'ahf_ros[bag]'"
-        in capfd.readouterr().err
-    )

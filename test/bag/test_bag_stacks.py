@@ -12,7 +12,7 @@ pytest.importorskip('rosbags', reason='rosbags is not installed')
 from ahf_ros.bag.definitions import IMAGE, typestore
 from ahf_ros.bag.run import BagTask, answer_bag
 from ahf_ros.cli import main
-from ahf_ros.session_settings import SLIDING, IdentificationSettings, StackSettings
+from ahf_ros.session_settings import IdentificationSettings, StackSettings
 from ahf_ros.synthetic.scene import SceneSettings, render
 from support import bags
 
@@ -49,15 +49,6 @@ def test_a_stack_has_one_answer_with_the_stamp_of_its_last_image(recording, tmp_
     assert ids(out)[0] == [target.id for target in render(SCENE).targets]
     said = capsys.readouterr().err
     assert '/image at 0.700000000 s: a stack of 3 of 4 images: no image follows' in said
-
-
-def test_a_sliding_window_answers_every_image_once_it_is_full(recording, tmp_path):
-    stacking = StackSettings(stack=4, stack_window=SLIDING)
-    task = BagTask(recording, tmp_path / 'out', identification=SETTINGS, stacking=stacking)
-    answer_bag(task, lambda *_: None)
-    assert stamps(task.output) == [4, 5, 6, 7]
-    truth = [target.id for target in render(SCENE).targets]
-    assert ids(task.output) == [truth] * 4
 
 
 def test_a_run_that_was_broken_off_continues_within_a_stack(recording, tmp_path):

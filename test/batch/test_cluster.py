@@ -5,8 +5,12 @@ from __future__ import annotations
 import json
 import logging
 import os
+import socket
+import subprocess
+import sys
+import time
 from collections.abc import Sequence
-from contextlib import closing
+from contextlib import ExitStack, closing, suppress
 from pathlib import Path
 from typing import Any
 
@@ -14,8 +18,9 @@ import numpy as np
 import pytest
 
 pytest.importorskip('distributed', reason='distributed is not installed')
-
 pytest.importorskip('rosbags', reason='rosbags is not installed')
+
+import distributed
 
 from ahf_ros.bag.definitions import typestore
 from ahf_ros.batch import cluster
@@ -23,9 +28,59 @@ from ahf_ros.batch.cluster import DaskEngine
 from ahf_ros.batch.engine import EngineLost, TaskFailed, finished_tasks
 from ahf_ros.cli import main
 from ahf_ros.interchange.image_files import write_image
-from support import bags
-from support.cluster import LIMIT, LocalCluster, free_port
+from support import ROOT, bags
 from support.jobs import do_as_told
+
+LIMIT = 300.0
+
+
+def free_port() -> int:
+    with socket.socket() as bound:
+        bound.bind(('127.0.0.1', 0))
+        port: int = bound.getsockname()[1]
+        return port
+
+
+class LocalCluster(ExitStack):
+    """Begins without a scheduler and without workers; all processes end with it."""
+
+    def __init__(self, folder: Path) -> None:
+        super().__init__()
+        self.address = f'tcp://127.0.0.1:{free_port()}'
+        self._folder = folder
+
+    def scheduler(self) -> subprocess.Popen[bytes]:
+        """Start a scheduler, and return once it listens."""
+        port = self.address.rpartition(':')[2]
+        process = self._start('scheduler', '--host', '127.0.0.1', '--port', port)
+        limit = time.monotonic() + LIMIT
+        while True:
+            with suppress(ConnectionRefusedError), socket.create_connection(('127.0.0.1', port)):
+                return process
+            assert process.poll() is None and time.monotonic() < limit
+            time.sleep(0.05)
+
+    def wait_for_workers(self, count: int) -> None:
+        with distributed.Client(self.address, timeout=LIMIT, set_as_default=False) as client:
+            client.wait_for_workers(count, timeout=LIMIT)
+
+    def worker(self, name: str, **environment: str) -> subprocess.Popen[bytes]:
+        return self._start(
+            'worker', self.address, '--no-nanny', '--nthreads', '1', '--name', name,
+            '--host', '127.0.0.1', '--local-directory', str(self._folder),
+            **environment,
+        )  # fmt: skip
+
+    def _start(self, what: str, *arguments: str, **environment: str) -> subprocess.Popen[bytes]:
+        process = subprocess.Popen(
+            [sys.executable, '-m', f'distributed.cli.dask_{what}', '--no-dashboard', *arguments],
+            cwd=self._folder,
+            env={**os.environ, 'PYTHONPATH': str(ROOT), **environment},
+            stderr=(self._folder / f'{what}.log').open('ab'),
+        )
+        self.callback(process.wait)
+        self.callback(process.kill)
+        return process
 
 
 def lose_one(client: Any) -> None:

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from benchmarks import dots
-from benchmarks.textures import SIZE, lookalikes, textured_image
 
 
 def test_every_cell_has_right_wrong_and_false() -> None:
@@ -16,18 +13,3 @@ def test_every_cell_has_right_wrong_and_false() -> None:
     assert head.count('|') == rule.count('|') == line.count('|')
     assert line.startswith('| light | stripe 0.3 | 30 | 29, 1 wrong, 2 false (0.012) |')
     assert line.endswith('| 2.0 | 0.50 |')
-
-
-def test_scenes_have_all_that_the_figures_ask_for() -> None:
-    names = {(group, name) for group, name, _ in dots.scenes()}
-    assert {('width', f'{width} px') for width in (24, 29, 36, 48, 60, 90)} < names
-    lights = {f'{light} {ambient}' for light in ('stripe', 'lattice') for ambient in (0.3, 0.12)}
-    assert {('light', name) for name in lights} < names
-
-
-def test_textures_follow_from_their_seed() -> None:
-    for image in (textured_image, lookalikes):
-        first, again, other = image(5), image(5), image(6)
-        assert first.shape == SIZE[::-1]
-        assert np.array_equal(first, again) and not np.array_equal(first, other)
-        assert first.std() > 5

@@ -25,19 +25,6 @@ def test_every_row_has_the_figures_of_both_detectors() -> None:
     assert line.startswith('| two targets | 2 of 2 | 0 | 0 | 0.0')
 
 
-def test_tables_have_all_that_the_figures_ask_for() -> None:
-    names = {cases[0].group: [case.name for case in cases] for cases in gsi.TABLES.values()}
-    assert {f'{tilt} deg' for tilt in (0, 60, 65, 70, 75, 80)} <= set(names['views'])
-    lights = {
-        f'{light} {ambient}'
-        for light in ('stripe', 'lattice', 'fringe', 'shadow')
-        for ambient in (0.3, 0.12, 0.04)
-    }
-    assert lights == set(names['lights'])
-    assert len(names['sizes']) == 9
-    assert len(names['ahf']) == 3
-
-
 def test_the_grid_has_all_of_its_dots_in_the_image() -> None:
     image = dot_grid(5)
     assert image.shape == (2656, 3984)

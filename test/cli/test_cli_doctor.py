@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from ahf_ros.cli import doctor
 from ahf_ros.extras import EXTRAS
 from support.command_line import ahf, python, status
 
@@ -26,7 +27,7 @@ def test_it_names_versions_and_every_extra(capsys: pytest.CaptureFixture[str]) -
     status('doctor')
     said = capsys.readouterr().out
     assert f'numpy {np.__version__}' in said
-    assert re.search(r'OpenCV \d.* with \d+ threads', said)
+    assert re.search(r'^OpenCV \d\S* \(.*\) with \d+ threads', said, re.MULTILINE)
     for extra, (purpose, _) in EXTRAS.items():
         (line,) = re.findall(rf'^  {extra}: (.*)$', said, re.MULTILINE)
         assert purpose in line
@@ -41,6 +42,24 @@ def test_two_kinds_of_opencv_are_a_problem(
     monkeypatch.syspath_prepend(tmp_path)
     assert status('doctor') == 1
     assert 'overwrite each other: pip uninstall' in capsys.readouterr().out
+
+
+def test_opencv_of_a_distribution_is_not_missing(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(doctor, '_OPENCV', ())
+    status('doctor')
+    said = capsys.readouterr().out
+    assert ' (not of pip) with ' in said
+    assert 'opencv' not in said
+
+
+def test_a_missing_opencv_is_said_in_one_line() -> None:
+    program = (
+        'import sys; sys.modules["cv2"] = None; import ahf_ros.cli as it; sys.exit(it.main())'
+    )
+    done = python('-c', program, 'identify', 'a.png')
+    assert (done.returncode, done.stderr) == (1, 'ahf: error: cv2 is missing, see ahf doctor\n')
 
 
 def is_installed(name: str) -> bool:

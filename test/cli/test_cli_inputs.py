@@ -81,7 +81,7 @@ def test_coordinates_are_those_of_stored_pixels_unless_upright_is_said(
     path.write_bytes(oriented_jpeg(scene.image, ROTATED))
 
     def result(*options: str) -> tuple[dict[int, tuple[float, float]], str]:
-        assert status('identify', '--json', *options, path) == 0
+        assert status('identify', '--json', '--family', 'metashape12', *options, path) == 0
         output = capsys.readouterr()
         (tmp_path / 'results.jsonl').write_text(output.out)
         (found,) = read_results(tmp_path / 'results.jsonl').values()

@@ -60,3 +60,6 @@ def test_a_word_among_arcs_has_to_be_clear() -> None:
         assert among_others(word).confidence == word.confidence
         found = among_others(Hypotheses.joined([word, foreign]))
         assert found.certain[0] == reported
+    doubts = Hypotheses.joined([replace(clear, confidence=np.array([0.98]))] + [doubtful] * 4)
+    assert doubts.certain.all()
+    assert not among_others(Hypotheses.joined([doubts, foreign])).certain.any()

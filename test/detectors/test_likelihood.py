@@ -161,7 +161,7 @@ def by_levels(of: PolarImages, light: float | None = 200.0, spread: float = 0.05
     radii = np.array([0.5, 1.6, 2.6, 3.1, 3.9])
     values = np.stack([of.at(np.array([radius])) for radius in radii], axis=2)
     known = values if light is None else np.full_like(values, light)
-    return level_evidence(of, values, known, np.full_like(values, spread), radii, BAND)
+    return level_evidence(of, values, known, np.full_like(values, spread), radii, NONE, BAND)
 
 
 @pytest.mark.parametrize(('polarity', 'paper'), [(1, 200.0), (-1, 50.0)])

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from ahf_ros.codes.ring import FAMILY_NAMES, canonical, family
+from ahf_ros.codes.ring import FAMILY_NAMES, canonical, family, ring_family
 from ahf_ros.detectors.ring.hypotheses import Hypotheses
 from ahf_ros.detectors.ring.polar import polar_images
 from ahf_ros.detectors.ring.reading import best_growth, read_bands
@@ -53,6 +55,19 @@ def test_words_are_read_in_their_direction(
     assert found.marked.min() > 0
     assert found.certain.all()
     assert found.hidden.max() <= hidden
+
+
+def test_bands_thinner_than_their_edges_are_soft_are_read(tmp_path: Path) -> None:
+    file = tmp_path / 'thin.json'
+    words = [22453, 735, 5943, 3689, 12733, 11605]
+    file.write_text(json.dumps({'family': 'thin', 'bits': 18, 'band': [2.3, 2.8], 'words': words}))
+    scene = replace(SMALL, dot_radius=5.1, edge_shift=-0.5, family='thin', family_file=str(file))
+    shown = rendered(replace(scene, width=400, height=300))
+    code = ring_family(str(file))
+    found = read_bands(shown.image.astype(np.float32), dots_of(shown), code)
+    right = canonical(found.words, code)[1] == [target.id for target in shown.targets]
+    assert (right & found.certain).sum() >= 5
+    assert not (found.certain & ~right).any()
 
 
 @pytest.mark.parametrize('shift', [-1.2, -0.8, 0.8, 1.2])

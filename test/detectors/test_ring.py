@@ -244,6 +244,15 @@ def test_over_exposed_targets_are_identified(light):
     assert np.abs(figures.errors).max() < 0.05
 
 
+@pytest.mark.parametrize(('levels', 'sharpened'), [((300, 45, 1.5), 0.0), ((230, 45, 1.0), 2.0)])
+def test_bright_marks_that_a_camera_clips_or_sharpens_are_read(levels, sharpened):
+    of = sheet(bright=True)
+    image = of.photograph(Exposure(levels=levels))
+    blurred = cv2.GaussianBlur(image, (0, 0), 1.5)
+    image = cv2.addWeighted(image, 1 + sharpened, blurred, -sharpened, 0)
+    assert counts(score(of.truth, identified(image))) == (4, 0, 0)
+
+
 @pytest.mark.parametrize('light', ['normal', 'stripe', 'lattice'])
 def test_an_image_of_clear_targets_is_read_once(light):
     image, settings = rendered(replace(SMALL, light=light)).image, DetectorSettings()

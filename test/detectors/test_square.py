@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from ahf_ros.codes import SQUARE_NAMES
-from ahf_ros.codes.square import words
+from ahf_ros.codes.square import marker, words
 from ahf_ros.detectors import Detector, create_detector
 from ahf_ros.evaluation import score
 from ahf_ros.session import identify
@@ -117,6 +117,17 @@ def test_markers_of_an_aprilgrid_touch_squares_and_have_wide_borders():
     assert np.abs(np.array([(it.x, it.y) for it in found]) - expected).max() < 0.02
     assert {it.border for it in found} == {2}
     assert max(abs(it.edge_shift) for it in found) < 0.1
+
+
+def test_markers_of_ten_pixels_are_read_in_sharp_images():
+    family = 'apriltag_36h11'
+    sheet = np.full((650, 900), 225, np.uint8)
+    for number in range(6):
+        top, left = 63 + 300 * (number // 3), 61 + 299 * (number % 3)
+        sheet[top : top + 168, left : left + 168] = 30 + 195 * (marker(family, number, 21) > 0)
+    image = cv2.resize(sheet, None, fx=1 / 16, fy=1 / 16, interpolation=cv2.INTER_AREA)
+    found = create_detector(family=family)(image)
+    assert [it.id for it in found] == list(range(6))
 
 
 @pytest.mark.parametrize('gray', [0, 90, 255])

@@ -141,10 +141,26 @@ def test_encodings_that_hold_no_image_are_named(encoding):
         decode_image(message(encoding, GRAY))
 
 
-def test_a_header_of_gigapixels_with_little_data():
-    huge = message('64FC4', GRAY, height=2**32 - 1, width=2**20, step=2**32 - 1)
-    with pytest.raises(ValueError, match=r'data has 60 bytes, accepted are at least'):
-        decode_image(huge)
+@pytest.mark.parametrize(
+    ('fields', 'error'),
+    [
+        ({'width': 0}, 'width is 0, accepted is an integer of at least 1'),
+        ({'height': 0}, 'height is 0, accepted is an integer of at least 1'),
+        ({'step': 9}, 'step is 9, accepted is an integer of at least 10'),
+        ({'step': 0}, 'step is 0, accepted is an integer of at least 10'),
+        ({'encoding': 'bgr8'}, 'step is 10, accepted is an integer of at least 30'),
+        ({'data': GRAY.ravel()[:-1].copy()}, 'data has 59 bytes, accepted are at least 60'),
+        ({'data': b''}, 'data has 0 bytes, accepted are at least 60'),
+        (
+            {'height': 2**32 - 1, 'width': 2**32 - 1, 'step': 2**32 - 1},
+            'data has 60 bytes, accepted are at least 18446744065119617025',
+        ),
+    ],
+)
+def test_a_header_that_does_not_fit_the_data_is_named(fields, error):
+    fitting = message('mono8', GRAY)
+    with pytest.raises(ValueError, match=error):
+        decode_image(SimpleNamespace(**vars(fitting) | fields))
 
 
 def test_data_that_is_longer_than_its_rows_is_named_but_for_planes_of_colour():

@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 import pytest
 
-from ahf_ros.interchange.export.networks import NETWORK_FORMATS, write_network_export
+from ahf_ros.interchange.export.formats import NETWORK_FORMATS, write_network_export
 from ahf_ros.orientation.solution import Solution
 from support.networks import SIZE, solution
 

@@ -16,8 +16,7 @@ import pytest
 from ahf_ros.interchange.camera_files import opencv_yaml, read_camera, ros_yaml
 from ahf_ros.interchange.control_files import read_control, read_scale_bars
 from ahf_ros.interchange.exif import Exif, read_exif
-from ahf_ros.interchange.network_cameras import CameraKnowledge, read_cameras
-from ahf_ros.interchange.network_files import make_network
+from ahf_ros.interchange.network_files import CameraKnowledge, make_network, read_cameras
 from ahf_ros.interchange.observation_files import ObservedPhotograph, read_observations
 from ahf_ros.interchange.target_json import to_json
 from ahf_ros.orientation.network import Network

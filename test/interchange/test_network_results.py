@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ahf_ros.interchange.export.networks import write_network_export
+from ahf_ros.interchange.export.formats import write_network_export
 from ahf_ros.interchange.network_results import read_network, write_network
 from ahf_ros.orientation.network import Rejection
 from ahf_ros.orientation.solution import Solution

@@ -79,7 +79,7 @@ def test_low_confidences_are_explained() -> None:
     low, high = (Target(7, 71, 1.0, 2.0, 3.0, 3.0, confidence=it) for it in (0.8, 0.99))
     found = Identification((UndecodedTarget(-1, 0, 5.0, 6.0, 2.0, 1.0, confidence=0.4), low, high))
     items = to_json(found, 'a.png', (30, 20), 'metashape12', 'ring')['targets']
-    why = f'ring reports probabilities from {CERTAIN} on'
+    why = f'probabilities are reported from {CERTAIN} on'
     assert [item.get('doubt', '') for item in items] == ['', why, '']
     items = to_json(found, 'a.png', (30, 20), 'mine', 'mine')['targets']
     assert items[1]['doubt'] == 'mine sets a lower limit of its own'

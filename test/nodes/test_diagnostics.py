@@ -11,7 +11,7 @@ pytest.importorskip('rclpy', reason='ROS 2 is not installed')
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 
 from ahf_ros.nodes.diagnostics import Diagnostics, Tally
-from ahf_ros.nodes.shortfall import IN_A_ROW, Shortfall
+from ahf_ros.nodes.pipeline import IN_A_ROW, Shortfall
 from ahf_ros.target import Identification, Target
 from support.detector import values
 

@@ -36,6 +36,6 @@ def test_every_node_has_help() -> None:
 
 
 def test_help_is_asked_for_before_the_arguments_of_ros(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(start.NODES, 'detector', 'json')  # has no main
+    monkeypatch.setitem(start.NODES, 'detector', 'json:Node')  # is not there
     with pytest.raises(AttributeError):
         start.start('detector', ['--ros-args', '-r', 'image:=x', '-h'])

@@ -15,8 +15,8 @@ from sensor_msgs.msg import Image
 from std_msgs.msg import Header
 
 from ahf_ros.nodes.diagnostics import Tally
-from ahf_ros.nodes.image_msg import image_message
 from ahf_ros.nodes.image_queue import ImageQueue, Worker
+from ahf_ros.nodes.messages import image_message
 from ahf_ros.nodes.pipeline import Pipeline
 from ahf_ros.nodes.settings import DetectorNodeSettings
 from ahf_ros.settings.nested import assemble

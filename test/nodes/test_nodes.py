@@ -23,7 +23,7 @@ from std_msgs.msg import Header
 from std_srvs.srv import Trigger
 
 from ahf_ros.msg import CodedTargetArray
-from ahf_ros.nodes.image_msg import image_message
+from ahf_ros.nodes.messages import image_message
 from ahf_ros.nodes.settings import DetectorNodeSettings
 from ahf_ros.settings.nested import flat_parameters
 from ahf_ros.synthetic.scene import Rendering, SceneSettings, render
@@ -126,29 +126,6 @@ def test_an_image_without_targets_is_answered(detector: DetectorProcess) -> None
     assert (answer.width, answer.height, answer.expected) == (300, 200, 0)
 
 
-def test_an_unknown_number_is_estimated(detector: DetectorProcess, message: Image) -> None:
-    assert detector.set(('estimate_expected', True)) == (True, '')
-    answer = detector.answer(message)
-    given = detector.identify(message, expected=6).coded_targets
-    assert detector.set(('estimate_expected', False)) == (True, '')
-    assert (answer.expected, answer.estimated) == (SCENE['targets'], True)
-    assert (given.expected, given.estimated) == (6, False)
-
-
-def test_colour_and_padding_make_no_difference(
-    detector: DetectorProcess, rendering: Rendering
-) -> None:
-    image = rendering.image
-    gray = detector.answer(image_message(image, header()))
-    colour = detector.answer(image_message(np.repeat(image[:, :, None], 3, axis=2), header()))
-    padded = np.pad(image, ((0, 0), (0, 24)))
-    message = image_message(padded, header())
-    message.width = image.shape[1]
-    assert len(gray.targets) == SCENE['targets']
-    assert colour.targets == gray.targets
-    assert detector.answer(message).targets == gray.targets
-
-
 def test_what_is_refused_is_counted_and_the_node_goes_on(
     graph: Any, detector: DetectorProcess, message: Image
 ) -> None:
@@ -204,15 +181,10 @@ def test_every_parameter_says_what_it_is(graph: Any, detector: DetectorProcess) 
 @pytest.mark.parametrize(
     ('name', 'value', 'words'),
     [
-        ('population', 1, ('population', '1', '2')),
         ('population', 'many', ("population is 'many', accepted is an integer from 2",)),
-        ('crossover', 1.5, ('crossover', '1.5', '1.0')),
         ('family', 'qr', ("family is 'qr', accepted is one of metashape12",)),
         ('detector', 'ring', ('read-only',)),
-        ('service', '/other', ('read-only',)),
         ('ahf', 1, ('ahf is 1, accepted is true or false',)),
-        ('expected_targets', -1, ('expected_targets', '-1', '0')),
-        ('max_radius', math.nan, ('max_radius', 'nan')),
         ('max_radius', 1, ('min_radius is 2.0, accepted is', 'at most max_radius, 1.0')),
     ],
 )
@@ -373,6 +345,7 @@ def test_a_signal_ends_the_node_in_the_middle_of_a_search(
         ),
         ('illumination', {'light': 'moon'}, ("light is 'moon', accepted is one of normal",)),
         ('illumination', {'rate': 0}, ('rate', '0', '0.001')),
+        ('detector', {'detector': 'command', 'command': 'some'}, ('allow_programs is False',)),
     ],
 )
 def test_a_refused_parameter_stops_a_node_at_the_start(

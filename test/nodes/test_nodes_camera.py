@@ -17,7 +17,7 @@ from std_msgs.msg import Header
 from ahf_ros.interchange.camera_info import calibration, undistorted
 from ahf_ros.msg import CodedTargetArray
 from ahf_ros.nodes.illumination import camera_info
-from ahf_ros.nodes.image_msg import image_message
+from ahf_ros.nodes.messages import image_message
 from ahf_ros.nodes.undistortion import Calibrations
 from ahf_ros.synthetic.scene import SceneSettings, render
 from support.detector import DetectorProcess

@@ -18,7 +18,7 @@ import rclpy
 from sensor_msgs.msg import Image
 from std_msgs.msg import Header
 
-from ahf_ros.nodes.image_msg import image_message
+from ahf_ros.nodes.messages import image_message
 from ahf_ros.nodes.process import JoiningExecutor
 from ahf_ros.nodes.start import NODES
 from support import live, packages

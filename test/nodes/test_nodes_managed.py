@@ -14,7 +14,7 @@ from sensor_msgs.msg import Image
 from std_msgs.msg import Header
 
 from ahf_ros.msg import CodedTargetArray
-from ahf_ros.nodes.image_msg import image_message
+from ahf_ros.nodes.messages import image_message
 from ahf_ros.synthetic.scene import SceneSettings, render
 from support.detector import DetectorProcess, overrides
 

@@ -27,8 +27,9 @@ from ahf_ros.interchange.point_clouds import (
     target_scan,
     whole_points,
 )
-from ahf_ros.nodes.cloud_msg import cloud_message
-from ahf_ros.orientation.transform import Transform
+from ahf_ros.nodes.messages import cloud_message
+from ahf_ros.orientation.camera import rotation_matrices
+from ahf_ros.orientation.transform import Transform, rotation_vector
 from ahf_ros.registration.scan import Scan
 from support.detector import overrides, own, values
 from support.scans import measured, ring, squared_error, station
@@ -117,14 +118,8 @@ class Registrar:
 
 def transform_of(message: PoseWithCovarianceStamped) -> Transform:
     turn, place = message.pose.pose.orientation, message.pose.pose.position
-    x, y, z, w = turn.x, turn.y, turn.z, turn.w
-    rotation = np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-        ]
-    )
+    vector = rotation_vector(np.array([turn.x, turn.y, turn.z, turn.w]))
+    rotation = rotation_matrices(vector[None])[0]
     covariance = message.pose.covariance.reshape(6, 6)
     return Transform(rotation, np.array([place.x, place.y, place.z]), covariance)
 

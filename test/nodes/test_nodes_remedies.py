@@ -23,32 +23,16 @@ from sensor_msgs.msg import CompressedImage, Image
 from std_msgs.msg import String
 from test_nodes import ENDLESS, header
 
-from ahf_ros.nodes.image_msg import image_message
-from ahf_ros.nodes.shortfall import IN_A_ROW
+from ahf_ros.nodes.messages import image_message
+from ahf_ros.nodes.pipeline import IN_A_ROW
 from ahf_ros.synthetic.scene import SceneSettings, render
 from support.detector import DetectorProcess, overrides, values
 
 SCENE = SceneSettings(width=200, height=150, targets=2, dot_radius=8.0, seed=4)
 
 
-class Talking(DetectorProcess):
-    """A detector whose warnings are read."""
-
-    def says(self, *words: str) -> None:
-        """Wait until the diagnostics warn in these words."""
-
-        def said() -> DiagnosticStatus | None:
-            every = (message.status[0] for message in self.diagnostics)
-            return next((it for it in every if words[0] in it.message), None)
-
-        status = self.graph.until(said)
-        assert status.level == DiagnosticStatus.WARN
-        assert all(it in status.message for it in words), status.message
-        self.diagnostics.clear()
-
-
 @pytest.fixture(scope='module')
-def detector(graph: Any, tmp_path_factory: pytest.TempPathFactory) -> Talking:
+def detector(graph: Any, tmp_path_factory: pytest.TempPathFactory) -> DetectorProcess:
     file = tmp_path_factory.mktemp('families') / 'mine.yaml'
     file.write_text('family: mine\nbits: 9\nband: [1.6, 2.4]\nwords: all\n')
     given = {
@@ -62,10 +46,10 @@ def detector(graph: Any, tmp_path_factory: pytest.TempPathFactory) -> Talking:
         'image_timeout': 0.1,
         'queue': 'lossless',
     }
-    return Talking(graph, '/remedies', *overrides(**given), subscribed=False)
+    return DetectorProcess(graph, '/remedies', *overrides(**given), subscribed=False)
 
 
-def test_what_has_no_effect_or_another_type_is_said(graph: Any, detector: Talking) -> None:
+def test_what_has_no_effect_or_another_type_is_said(graph: Any, detector: DetectorProcess) -> None:
     other = graph.node.create_publisher(String, '/remedies/image', 1)
     detector.says('/remedies/image is of type std_msgs/msg/String, accepted is sensor_msgs/msg/')
     graph.node.destroy_publisher(other)
@@ -74,7 +58,7 @@ def test_what_has_no_effect_or_another_type_is_said(graph: Any, detector: Talkin
 
 
 def test_images_in_a_row_without_what_is_expected_are_a_warning(
-    graph: Any, detector: Talking
+    graph: Any, detector: DetectorProcess
 ) -> None:
     scene = render(SCENE)
     ids = sorted(target.id for target in scene.targets)
@@ -103,7 +87,7 @@ def test_images_in_a_row_without_what_is_expected_are_a_warning(
     assert detector.diagnostics[-1].status[0].level == DiagnosticStatus.OK
 
 
-def test_data_that_is_too_long_is_rejected_with_the_numbers(detector: Talking) -> None:
+def test_data_that_is_too_long_is_rejected_with_the_numbers(detector: DetectorProcess) -> None:
     image = image_message(np.tile(np.arange(40, dtype=np.uint8), (30, 1)), header())
     image.data.extend(bytes(40))
     detector.image.publish(image)
@@ -113,7 +97,7 @@ def test_data_that_is_too_long_is_rejected_with_the_numbers(detector: Talking) -
 
 
 def test_a_dump_of_the_parameters_can_be_loaded(
-    graph: Any, detector: Talking, tmp_path: Path
+    graph: Any, detector: DetectorProcess, tmp_path: Path
 ) -> None:
     assert detector.set(('expected_targets', 0), ('expected_ids', '5')) == (True, '')
     name = '/remedies/detector'
@@ -144,7 +128,7 @@ def test_a_dump_of_the_parameters_can_be_loaded(
 
 
 def test_more_parameters_than_a_node_has_are_refused_at_once(
-    graph: Any, detector: Talking
+    graph: Any, detector: DetectorProcess
 ) -> None:
     count = 10_000
     one = ParameterMessage(name='seed')
@@ -161,7 +145,7 @@ def test_more_parameters_than_a_node_has_are_refused_at_once(
 
 
 def test_an_image_that_a_decoder_fills_up_is_named_with_its_stamp(
-    graph: Any, detector: Talking
+    graph: Any, detector: DetectorProcess
 ) -> None:
     assert detector.set(('image_transport', 'compressed')) == (True, '')
     camera = graph.publisher(CompressedImage, '/remedies/image/compressed')
@@ -177,7 +161,7 @@ def test_an_image_that_a_decoder_fills_up_is_named_with_its_stamp(
 
 
 def test_a_camera_that_is_faster_than_the_identification_is_a_warning(
-    graph: Any, detector: Talking
+    graph: Any, detector: DetectorProcess
 ) -> None:
     image = render(SCENE).image
     search = {**ENDLESS, 'ahf': True, 'queue': 'latest'}
@@ -195,7 +179,9 @@ def test_a_camera_that_is_faster_than_the_identification_is_a_warning(
     )
 
 
-def test_two_detectors_on_one_topic_or_of_one_name_say_so(graph: Any, detector: Talking) -> None:
+def test_two_detectors_on_one_topic_or_of_one_name_say_so(
+    graph: Any, detector: DetectorProcess
+) -> None:
     named = '2 nodes are named /remedies/detector: give one another name by -r __node:=OTHER'
     every = '/remedies/detector, /remedies/detector, /remedies/second'
     on_one_topic = f'3 nodes publish on /remedies/coded_targets, {every}: give one another topic'
@@ -214,7 +200,7 @@ def test_two_detectors_on_one_topic_or_of_one_name_say_so(graph: Any, detector: 
         assert words in warnings
 
 
-def test_the_log_has_what_was_said(detector: Talking) -> None:
+def test_the_log_has_what_was_said(detector: DetectorProcess) -> None:
     status, warnings = detector.process.end()
     assert status == 0
     (started,) = [it for it in detector.process.log.splitlines() if '[INFO]' in it][:1]

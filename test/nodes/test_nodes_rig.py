@@ -19,7 +19,7 @@ from visualization_msgs.msg import ImageMarker, Marker, MarkerArray
 
 from ahf_ros.interchange.point_clouds import COVARIANCE
 from ahf_ros.msg import CodedTargetArray
-from ahf_ros.nodes.image_msg import image_message
+from ahf_ros.nodes.messages import image_message
 from ahf_ros.synthetic.camera import Camera, tilted_camera
 from ahf_ros.synthetic.scene import Rendering, SceneSettings, render
 from support.detector import DetectorProcess, overrides
@@ -174,46 +174,19 @@ def test_what_has_no_partner_is_counted(rig: Rig) -> None:
     assert not [it for it in rig.points if it.header.stamp == lonely.stamp]
 
 
-def test_stamps_may_differ_by_the_tolerance(rig: Rig) -> None:
-    with rig.resubscription('points'):
-        assert rig.set(('cloud_tolerance', 0.01)) == (True, '')
-    image = image_message(RENDERING.image, header())
-    cloud = cloud_message(SCANNED, image.header)
-    cloud.header.stamp.nanosec += 9_000_000
-    rig.answer(image)
-    rig.cloud.publish(cloud)
-    assert rig.found(image.header).width == SCENE.targets
-    with rig.resubscription('points'):
-        assert rig.set(('cloud_tolerance', 0)) == (True, '')
-
-
 def test_bad_clouds_are_named_and_the_node_goes_on(rig: Rig) -> None:
     rig.graph.newer(rig.diagnostics)
     before = rig.count('clouds rejected')
     flat = cloud_message(SCANNED, header())
     flat.height, flat.width = 1, flat.height * flat.width
-    short = cloud_message(SCANNED[:9], header())
-    short.height = 10
-    huge = cloud_message(SCANNED[:9], header())
-    huge.height = huge.width = huge.row_step = 2**32 - 1
-    nameless = cloud_message(SCANNED[:9], header())
-    nameless.fields = nameless.fields[:2]
-    bad = [
-        (flat, 'height is 1, accepted is an integer of at least 2'),
-        (short, 'data has 92160 bytes, accepted are at least 102400'),
-        (huge, 'row_step is 4294967295, accepted is an integer of at least 68719476720'),
-        (nameless, "fields are 'x', 'y', accepted are those with x, y and z"),
-        (PointCloud2(header=header()), 'height is 0, accepted'),
-    ]
-    for count, (message, words) in enumerate(bad, start=1):
-        rig.cloud.publish(message)
-        rig.graph.until(lambda count=count: rig.count('clouds rejected') == before + count)
-        reason = rig.told('last reason for rejection of a cloud')
-        assert reason.startswith(words)
+    rig.cloud.publish(flat)
+    rig.graph.until(lambda: rig.count('clouds rejected') == before + 1)
+    reason = rig.told('last reason for rejection of a cloud')
+    assert reason.startswith('height is 1, accepted is an integer of at least 2')
     image = image_message(RENDERING.image, header())
     rig.answer(image)
     rig.cloud.publish(cloud_message(SCANNED[:, :-1], image.header))
-    rig.graph.until(lambda: rig.count('clouds rejected') == before + len(bad) + 1)
+    rig.graph.until(lambda: rig.count('clouds rejected') == before + 2)
     assert rig.told('last reason for rejection of a cloud') == (
         'cloud has 639 x 480 points, accepted is 640 x 480, the size of the image; for another '
         'one, set cloud_offset_x, cloud_offset_y and cloud_step'

@@ -23,7 +23,7 @@ from std_msgs.msg import Header, String
 from test_nodes import ENDLESS
 
 from ahf_ros.msg import CodedTargetArray
-from ahf_ros.nodes.image_msg import image_message
+from ahf_ros.nodes.messages import image_message
 from ahf_ros.nodes.process import Ending
 from ahf_ros.nodes.settings import DetectorNodeSettings
 from ahf_ros.settings.nested import flat_parameters

@@ -12,7 +12,6 @@ import pytest
 
 pytest.importorskip('rclpy', reason='ROS 2 is not installed')
 
-from diagnostic_msgs.msg import DiagnosticStatus
 from rcl_interfaces.srv import ListParameters
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import Image, PointCloud2
@@ -20,7 +19,7 @@ from test_nodes import header
 from test_nodes_rig import cloud_message
 
 from ahf_ros.msg import CodedTargetArray
-from ahf_ros.nodes.image_msg import image_message
+from ahf_ros.nodes.messages import image_message
 from ahf_ros.synthetic.scene import SceneSettings
 from support.detector import DetectorProcess, overrides, own, values
 from support.scenes import rendered
@@ -101,29 +100,10 @@ def test_the_start_what_has_no_effect_and_the_quality_of_service(graph: Any) -> 
         graph.node.destroy_publisher(publisher)
 
 
-class Quiet(DetectorProcess):
-    """A detector that soon says what it misses, and what it says."""
-
-    def __init__(self, graph: Any) -> None:
-        given = overrides(image_timeout=0.1, cloud='true', cloud_tolerance=0.001)
-        super().__init__(graph, '/quiet', *given, subscribed=False)
-
-    def says(self, *words: str) -> dict[str, str]:
-        """Wait until the diagnostics warn in these words; return their entries."""
-
-        def said() -> DiagnosticStatus | None:
-            every = (message.status[0] for message in self.diagnostics)
-            return next((it for it in every if words[0] in it.message), None)
-
-        status = self.graph.until(said)
-        assert status.level == DiagnosticStatus.WARN
-        assert all(it in status.message for it in words), status.message
-        self.diagnostics.clear()
-        return {item.key: item.value for item in status.values}
-
-
 def test_what_does_not_arrive_is_named_with_the_reason_and_the_remedy(graph: Any) -> None:
-    quiet, node = Quiet(graph), graph.node
+    node = graph.node
+    given = overrides(image_timeout=0.1, cloud='true', cloud_tolerance=0.001)
+    quiet = DetectorProcess(graph, '/quiet', *given, subscribed=False)
     nobody = 's: nobody publishes sensor_msgs/msg/Image on /quiet/image; it is published on '
     elsewhere = node.create_publisher(Image, '/quiet/image_raw', 1)
     quiet.says(f'{nobody}/quiet/image_raw', ': remap with -r image:=/quiet/image_raw')
@@ -170,7 +150,7 @@ def test_what_does_not_arrive_is_named_with_the_reason_and_the_remedy(graph: Any
     assert_losses_are_counted(quiet, answers)
 
 
-def assert_losses_are_counted(quiet: Quiet, answers: list[CodedTargetArray]) -> None:
+def assert_losses_are_counted(quiet: DetectorProcess, answers: list[CodedTargetArray]) -> None:
     assert quiet.set(('queue', 'lossless'), ('image_timeout', 0.0)) == (True, '')
     camera = quiet.graph.node.create_publisher(Image, '/quiet/image', 1)
     before = len(answers)

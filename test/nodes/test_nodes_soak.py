@@ -39,7 +39,7 @@ from std_msgs.msg import Header
 from std_srvs.srv import Trigger
 
 from ahf_ros.msg import CodedTargetArray
-from ahf_ros.nodes.image_msg import image_message
+from ahf_ros.nodes.messages import image_message
 from ahf_ros.srv import Identify
 from ahf_ros.synthetic.scene import SceneSettings, render
 from support import live

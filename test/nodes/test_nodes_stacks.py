@@ -12,7 +12,7 @@ pytest.importorskip('rclpy', reason='ROS 2 is not installed')
 from sensor_msgs.msg import Image
 from std_msgs.msg import Header
 
-from ahf_ros.nodes.image_msg import image_message
+from ahf_ros.nodes.messages import image_message
 from ahf_ros.nodes.settings import IlluminationNodeSettings
 from ahf_ros.synthetic.scene import SceneSettings, render
 from support.detector import DetectorProcess, overrides
@@ -83,35 +83,6 @@ def test_a_stack_that_does_not_fill_is_answered_when_its_time_is_up(
         assert sent(detector, [message(PHASES[0], 50)], 1)[0][0] == 50
     finally:
         assert detector.set(('stack_timeout', 1e4)) == (True, '')
-
-
-def test_a_sliding_window_answers_every_image_and_bad_ones_do_not_end_the_node(
-    detector: DetectorProcess,
-) -> None:
-    assert detector.set(('stack_window', 'sliding')) == (True, '')
-    try:
-        stream = [message(pixels, 60 + number) for number, pixels in enumerate(PHASES * 2)]
-        stream[5].data = stream[5].data[:-1]
-        stamps = [stamp for stamp, _ in sent(detector, stream, 4)]
-        assert stamps == [63, 64, 66, 67]
-    finally:
-        assert detector.set(('stack_window', 'tumbling')) == (True, '')
-
-
-def test_parameters_end_a_stack_and_single_images_are_answered_again(
-    detector: DetectorProcess,
-) -> None:
-    detector.image.publish(message(PHASES[0], 80))
-    # The service is answered after what was sent before only if the image was taken: so wait.
-    received = len(detector.targets)
-    assert detector.set(('stack_timeout', 0.2)) == (True, '')
-    detector.graph.until(lambda: len(detector.targets) > received)
-    assert detector.targets[-1].header.stamp.sec == 80
-    assert detector.set(('stack', 1)) == (True, '')
-    try:
-        assert sent(detector, [message(PHASES[1], 81)], 1)[0][0] == 81
-    finally:
-        assert detector.set(('stack', 4), ('stack_timeout', 1e4)) == (True, '')
 
 
 def test_the_illumination_node_shows_all_phases_of_each_scene() -> None:

@@ -17,7 +17,7 @@ from test_foxglove_layout import leaves
 from test_nodes_registration import organised, scan, target_points
 
 from ahf_ros.nodes.interfaces import NODES
-from ahf_ros.nodes.registration_msg import field_points, residual_points
+from ahf_ros.nodes.messages import field_points, residual_points
 from ahf_ros.nodes.settings import RegistrationNodeSettings
 from ahf_ros.registration.session import Registration
 from support import ROOT

@@ -34,8 +34,9 @@ AGAIN = 10.0  # s until a shot that is not answered is repeated
 UNLIKELY = 40.0  # of a chi-square of 6 degrees of freedom, which rarely exceeds 30
 
 
-def len_above(items: list[Any], count: int) -> bool:
-    return len(items) > count
+def stamp_of(message: Any) -> int:
+    """Return the stamp, ns."""
+    return message.header.stamp.sec * 10**9 + message.header.stamp.nanosec
 
 
 class Rig:
@@ -50,15 +51,19 @@ class Rig:
         self.clouds = graph.listen(PointCloud2, '/registration/cloud')
         self.poses = graph.listen(PoseWithCovarianceStamped, '/pose/pose')
 
-    def rehearse(self, shoot: Callable[[], None]) -> None:
-        """Shoot until a shot is answered by all nodes, since first messages may be lost."""
+    def rehearse(self, shoot: Callable[[], int]) -> None:
+        """Shoot until all nodes answer the last shot, since first messages may be lost.
+
+        `shoot` returns the stamp, ns. Shots before the last one are answered or lost by then.
+        """
         said = self.transforms, self.residuals, self.clouds, self.poses
 
         def answered() -> bool:
-            before, limit = [len(it) for it in said], time.monotonic() + AGAIN
-            shoot()
-            self.graph.until(lambda: all(map(len_above, said, before)) or time.monotonic() > limit)
-            return all(map(len_above, said, before))
+            stamp, limit = shoot(), time.monotonic() + AGAIN
+            self.graph.until(
+                lambda: all(stamp in map(stamp_of, it) for it in said) or time.monotonic() > limit
+            )
+            return all(stamp in map(stamp_of, it) for it in said)
 
         self.graph.until(answered)
         self.call('reset')
@@ -114,9 +119,11 @@ def test_scans_of_a_box_live_and_recorded_are_in_its_frame(graph: Any, tmp_path:
     rig = Rig(graph, expected_targets='12', **given)
     publishers = {name: graph.publisher(kind, name) for name, kind in SCANNER['TOPICS'].items()}
 
-    def shoot(number: int) -> None:
-        for topic, message in SCANNER['messages'](SCANNER['scan'](number), time.time_ns()):
+    def shoot(number: int) -> int:
+        stamp = time.time_ns()
+        for topic, message in SCANNER['messages'](SCANNER['scan'](number), stamp):
             publishers[topic].publish(message)
+        return stamp
 
     rig.rehearse(lambda: shoot(0))
     for number in SCANS:

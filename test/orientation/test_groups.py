@@ -6,9 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from ahf_ros.orientation.groups import separated
 from ahf_ros.orientation.network import Rejection
-from ahf_ros.orientation.solution import Solution
+from ahf_ros.orientation.solution import Solution, separated
 from support.networks import known, solution
 
 

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from ahf_ros.cli.network_table import print_network
+from ahf_ros.cli.orient import print_network
 from ahf_ros.orientation.network import Rejection
 from ahf_ros.orientation.solution import Solution
 from ahf_ros.report.network_figures import image_figure, sensor_map, views

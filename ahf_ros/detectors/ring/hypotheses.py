@@ -142,20 +142,31 @@ def among_others(hypotheses: Hypotheses) -> Hypotheses:
     Targets of one image share a family. Whole bands that arcs of any length explain better than
     words, with ends anywhere, and targets that do not look like their print are foreign. Among
     these a word is one by chance, unless more targets share its family; and it is arcs of any
-    length, unless it explains its band better.
+    length, unless it explains its band better. What is not certain among these speaks for no other
+    word of its family.
     """
-    certain, confidence = hypotheses.certain, hypotheses.confidence
     arcs = (hypotheses.coded < -_FOREIGN) & (hypotheses.ends <= 0) & (hypotheses.share > _ROUND)
-    foreign = (arcs | (hypotheses.unlike > COVERED)) & ~certain
-    left = confidence.copy()
+    arcs |= hypotheses.unlike > COVERED
+    left = hypotheses
+    while True:
+        among = replace(hypotheses, confidence=_among(hypotheses, left, arcs & ~left.certain))
+        if np.array_equal(among.certain, left.certain):
+            return among
+        left = among
+
+
+def _among(hypotheses: Hypotheses, likely: Hypotheses, foreign: np.ndarray) -> np.ndarray:
+    """Return the confidence of hypotheses, by how likely each is and by foreign bands, (k,)."""
+    left = hypotheses.confidence.copy()
     for code in dict.fromkeys(hypotheses.families):
         own = hypotheses.families == code
-        sure, others = confidence[own], foreign[own].sum()
-        alike = (certain[own] * sure).sum() - certain[own] * sure + 0.5
+        sure, others = hypotheses.confidence[own], foreign[own].sum()
+        alike = (likely.certain * likely.confidence)[own]
+        alike = alike.sum() - alike + 0.5
         by_chance = np.maximum((others + 0.5) / alike, 1)
         as_arcs = others / alike * np.exp(-np.maximum(hypotheses.coded[own], 0)) / _CODED
         left[own] = sure / (1 + (1 - sure) * (by_chance - 1) + sure * as_arcs)
-    return replace(hypotheses, confidence=left)
+    return left
 
 
 def resolve(hypotheses: Hypotheses, ids: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

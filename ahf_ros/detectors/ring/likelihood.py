@@ -138,11 +138,11 @@ def edge_evidence(
     inner, outer = band_edges(radius, growth, band)
     beside = _BESIDE + np.maximum(polar.blur - SOFT, 0)
     beside = np.clip(beside / polar.size, _MINIMUM_BESIDE, _MAXIMUM_BESIDE)
-    beside = np.minimum(beside, 0.45 * (outer - inner))
     before = np.minimum(beside, 0.5 * (inner - radius - growth))
+    within = np.minimum(beside, 0.45 * (outer - inner))
     edges = light_edges(polar, radius, growth, inner)
     ground_at = np.stack([inner - before, outer + beside])
-    band_at = np.stack([inner + beside, outer - beside])
+    band_at = np.stack([inner + within, outer - within])
     ground, inside = (np.stack([polar.at(of) for of in at], axis=1) for at in (ground_at, band_at))
     # Shares of ink on ground and band, without marks and with them.
     bare = [_blurred(polar, at, -np.inf, radius + growth) for at in (ground_at, band_at)]
@@ -153,7 +153,7 @@ def edge_evidence(
     lit_ground = np.maximum(ground, polar.paper(ground, marked[0]))
     paper, ink = _step_evidence(polar, inside, ground, edges, bare, marked)
     weight = weights(polar)
-    visible = polar.reach[:, None] >= np.stack([inner + beside, outer + beside], axis=1)[..., None]
+    visible = polar.reach[:, None] >= np.stack([inner + within, outer + beside], axis=1)[..., None]
     share = weight[:, None, None] * visible
     return Evidence(
         paper=paper * share,
@@ -256,7 +256,7 @@ def _step_evidence(
         inked = np.where(less, np.maximum(inked, 1 / np.maximum(np.abs(mark), _FLAT)), inked)
     lit = edges.astype(np.float32)[:, None, None]
     anything = _PLAIN * flat + (1 - _PLAIN) * _ANY
-    clear = (band < SATURATED) | np.isinf(limit)
+    clear = polar.tells(band)
     paper, ink = (
         np.where(clear, np.log(((1 - lit) * density + lit * _ANY) / anything), 0)
         for density in (flat, inked)
@@ -276,28 +276,32 @@ def level_evidence(
     light: np.ndarray,
     spread: np.ndarray,
     radii: np.ndarray,
+    growth: np.ndarray,
     band: tuple[float, float],
 ) -> Evidence:
     """Return the evidence of levels in dots and bands, and beside these, under predicted light.
 
     Gray values `levels`, shape (k, m, d), were read at radii (d,): in the dot, in the gap, in the
     band or beyond it. `light` and `spread`, as `predicted_light` gives them, are what paper has
-    there and the deviation of its logarithm. Of `polar` only the look of ink is used.
+    there and the deviation of its logarithm. Of `polar` only the looks of ink and of edges are
+    used. The growth of the dots' colour, (k,), is in units of the radii.
     """
     level, noise = polar.logs(levels)
     known = np.isfinite(spread)
-    spread, inked = np.where(known, spread, 1), polar.inked(light, levels)
+    inner, outer = band
+    in_dot, in_band = radii < 1, (radii > inner) & (radii < outer)
+    at, edges = np.tile(radii, (len(growth), 1)).T, band_edges(np.ones(len(growth)), growth, band)
+    share = np.where(in_dot, 1, _blurred(polar, at, *edges)[..., 0])[:, None]
+    spread, inked = np.where(known, spread, 1), polar.printed(light, share, levels)
     of_paper = np.sqrt(_PAPER_LEVEL**2 + noise**2 + spread**2)
     of_ink = np.sqrt(_INK_LEVEL**2 + noise**2 + (spread * _gain(light, inked)) ** 2)
     errors = level - polar.logs(light)[0]
     densities = [normal(errors, of_paper), normal(level - polar.logs(inked)[0], of_ink)]
     anything = _PLAIN * densities[0] + (1 - _PLAIN) * _ANY
     depth = np.minimum(_DEPTH * polar.size / CORRELATION, 1)
-    share = (weights(polar) * depth).astype(np.float32)
+    weight = (weights(polar) * depth).astype(np.float32)
     limit = polar.glare[:, None, None]
-    seen = known & ((levels < SATURATED) | np.isinf(limit)) & (radii <= polar.reach[..., None])
-    inner, outer = band
-    in_dot, in_band = radii < 1, (radii > inner) & (radii < outer)
+    seen = known & polar.tells(levels) & (radii <= polar.reach[..., None])
     on_ground = ~in_dot & ~in_band
     middle = (inner + outer) / 2
     halves = (radii > 1) & (radii < middle), radii > middle
@@ -307,7 +311,7 @@ def level_evidence(
     surprise = _surprise(errors, of_paper, seen & on_ground)
     paper, ink = (
         np.where(seen, np.log(((1 - surprise) * of + surprise * _ANY) / anything), 0)
-        * share[:, None, None]
+        * weight[:, None, None]
         for of in densities
     )
     ground = [paper[..., half & on_ground].sum(axis=2) for half in halves]
@@ -319,7 +323,7 @@ def level_evidence(
     return Evidence(
         paper=of_halves[0],
         ink=of_halves[1],
-        weight=share,
+        weight=weight,
         dot=(ink - paper)[..., in_dot].sum(axis=(1, 2)),
         lit=surprise[:, 0, 0].astype(np.float32),
         covered=np.stack([dark[..., half & on_ground].any(axis=2) for half in halves], axis=1),

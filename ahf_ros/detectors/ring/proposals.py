@@ -17,7 +17,7 @@ import numpy as np
 from ahf_ros.codes.ring import Family, least_marked
 from ahf_ros.detectors.ring.circles import RAYS, REACH
 from ahf_ros.detectors.ring.known import Explained
-from ahf_ros.detectors.ring.likelihood import FEW_MARKS, edge_evidence, growth_by
+from ahf_ros.detectors.ring.likelihood import FEW_MARKS, band_edges, edge_evidence, growth_by
 from ahf_ros.detectors.ring.polar import DOT, MARGIN, PART, PolarImages, polar_images
 from ahf_ros.features.circle_fit import ENOUGH, NO_FITS, Fit, fit_dots
 from ahf_ros.features.dot_search import voted_dots, whole_dots
@@ -136,25 +136,29 @@ def _bounds(
     for shift in shifts or np.linspace(-_MAXIMUM_SHIFT, _MAXIMUM_SHIFT, tried).tolist():
         growth = growth_by(shift, polar.size)
         edges = edge_evidence(polar, 1 - growth, growth, band)
+        holes = _holes(polar, band_edges(1 - growth, growth, band)[1])
         cap = _CAP * edges.weight[:, None]
         for index, count in enumerate(bits):
             paper, ink = (_of_sectors(of.sum(axis=1), count) for of in (edges.paper, edges.ink))
             of_word = np.maximum(np.maximum(paper, ink), -_COVER).sum(axis=2)
             marked = _of_sectors(np.clip((edges.ink - edges.paper).sum(axis=1), -cap, cap), count)
             bound = np.minimum(of_word, np.maximum(marked, 0).sum(axis=2)).max(axis=1)
-            best[index] = np.maximum(best[index], bound / (angles * edges.weight))
-    return np.where(_holes(polar, band), -np.inf, best)
+            bound = np.where(holes, -np.inf, bound / (angles * edges.weight))
+            best[index] = np.maximum(best[index], bound)
+    return best
 
 
-def _holes(polar: PolarImages, band: tuple[float, float]) -> np.ndarray:
-    """Return whether dots are holes through which one sees what lies beyond the band, (k,)."""
-    one = np.ones(len(polar.size))
+def _holes(polar: PolarImages, outer: np.ndarray) -> np.ndarray:
+    """Return whether dots are holes through which one sees what lies beyond the band, (k,).
+
+    From the radii of the outer edges of the bands, (k,).
+    """
     inside, outside = (
-        np.concatenate([polar.logs(polar.at(one * radius))[0] for radius in radii], axis=1)
-        for radii in (DOT, band[1] + MARGIN)
+        np.stack([polar.logs(polar.at(radius))[0] for radius in radii], axis=1)
+        for radii in (DOT[:, None] * np.ones_like(outer), outer + MARGIN[:, None])
     )
-    alike = np.abs(outside - np.median(inside, axis=1, keepdims=True)) < _ALIKE
-    return np.asarray((polar.polarity < 0) & (alike.mean(axis=1) > _BEYOND))
+    alike = np.abs(outside - np.median(inside, axis=(1, 2), keepdims=True)) < _ALIKE
+    return np.asarray((polar.polarity < 0) & (alike.mean(axis=2) > _BEYOND).all(axis=1))
 
 
 def _of_sectors(values: np.ndarray, bits: int) -> np.ndarray:

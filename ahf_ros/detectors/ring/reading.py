@@ -46,6 +46,7 @@ from ahf_ros.imaging.black import lifted
 PER_SECTOR = 10
 """Angles of a sector at which bands are read."""
 
+_THIN = 1.5  # width of a band, in deviations of blur, up to which its dot alone is measured
 _SHIFTS = np.arange(-2.4, 2.41, 0.4)  # of edges, that are tried, px
 
 
@@ -74,23 +75,26 @@ def _read_part(gray: np.ndarray, dots: Fit, family: Family, prior: Prior) -> Hyp
     printed = dots.select(read)
     printed = replace(printed, frames=frame.scaled(printed.frames, 1 - growth))
     # In the frame of the printed dot, the same growth is a larger share.
-    overhang = _overhang(growth / (1 - growth), family)
     some = polar.select(read), edges, words.select(read)
-    words = _settled(gray, printed, *some, overhang, family, prior.expected)
+    growth = growth / (1 - growth)
+    words = _settled(gray, printed, *some, growth, family, prior.expected)
     good = _mean_odds(words, edges.weight) > hopeful
-    read, printed, words = read[good], printed.select(good), words.select(good)
+    read, growth = read[good], growth[good]
+    printed, words = printed.select(good), words.select(good)
     fit = _joint_fit(gray, printed, words, PER_SECTOR // 2, 1, family)
+    fit = _by_dot(fit, printed, growth, _thin(printed, growth, family))
     growth = fit.polarity * fit.edge_shift / fit.size
     polar = polar_images(gray, fit, family.band, family.bits * PER_SECTOR)
     edges = edge_evidence(polar, np.ones(len(read)), growth, family.band)
     overhang = _overhang(growth, family)
     words = decode(edges, overhang, family, prior.expected)
-    words = _settled(gray, fit, polar, edges, words, overhang, family, prior.expected)
+    words = _settled(gray, fit, polar, edges, words, growth, family, prior.expected)
     words = with_ends(polar, words, overhang, edges.lit, family)
     words = replace(words, unlike=unlike_print(polar, words, growth, overhang, family))
     good = _mean_odds(words, edges.weight) > hopeful
-    read, fit, words = read[good], fit.select(good), words.select(good)
-    fit = _joint_fit(gray, fit, words, PER_SECTOR, 2, family)
+    read, dots, words = read[good], fit.select(good), words.select(good)
+    fit = _joint_fit(gray, dots, words, PER_SECTOR, 2, family)
+    fit = _by_dot(fit, dots, growth[good], _thin(dots, growth[good], family))
     return unread.replaced(read, Hypotheses.of(fit, words, family))
 
 
@@ -129,13 +133,13 @@ def _settled(
     polar: PolarImages,
     edges: Evidence,
     words: Words,
-    overhang: np.ndarray,
+    growth: np.ndarray,
     family: Family,
     expected: frozenset[int],
 ) -> Words:
     """Return the words of targets, by all evidence where edges alone leave a doubt.
 
-    Targets are in the frames of their printed dots.
+    Targets are in the frames of their printed dots, the unit of the growth of their colour, (k,).
     """
     some = np.flatnonzero(_doubtful(words, edges))
     if not some.size:
@@ -150,11 +154,29 @@ def _settled(
     levels = lifted(levels, polar.lift.astype(np.float32)[:, None, None])
     printed = family.band, family.circles
     light = predicted_light(gray, targets.frames, polar.lift, angles, radii, *printed)
-    evidence = edges.plus(level_evidence(polar, levels, *light, radii, family.band))
-    of_all = decode(evidence, overhang[some], family, expected)
+    growth = growth[some]
+    evidence = edges.plus(level_evidence(polar, levels, *light, radii, growth, family.band))
+    of_all = decode(evidence, _overhang(growth, family), family, expected)
     hidden = of_all.hidden | (polar.reach < of_band[0])
     # What speaks against no target is that of edges, so that all targets compare.
     return words.replaced(some, replace(of_all, seen=words.seen[some], hidden=hidden))
+
+
+def _thin(printed: Fit, growth: np.ndarray, family: Family) -> np.ndarray:
+    """Return which bands are so thin that blur moves their edges apart, indices.
+
+    The growth of the dots' colour, (k,), is in radii of the printed dots.
+    """
+    inner, outer = family.band
+    width = (outer - inner + 2 * growth) * printed.size
+    return np.flatnonzero(width < _THIN * printed.blur)
+
+
+def _by_dot(fit: Fit, printed: Fit, growth: np.ndarray, which: np.ndarray) -> Fit:
+    """Return joint fits, some of them with the frames of printed dots alone, and their growth."""
+    shift = printed.polarity * growth * printed.size
+    alone = replace(printed, edge_shift=shift, share=fit.share, deviation=fit.deviation)
+    return fit.replaced(which, alone.select(which))
 
 
 def _mean_odds(words: Words, weight: np.ndarray) -> np.ndarray:

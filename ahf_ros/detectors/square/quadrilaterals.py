@@ -22,7 +22,6 @@ _MINIMUM_STEP = 24  # from the darkest to the brightest pixel of a window, of 25
 _SMALLEST = 8.0  # side of a quadrilateral, px
 _SHORTEST = 2.8  # outline, in such sides
 _SOLID = 0.3  # minimum area of a region with its holes, as a share of a square's of its perimeter
-_THICK = 1.0  # minimum area of a region that is parted, per pixel of its outline, px
 _TATTERED, _FILLED = 4.0, 0.15  # bounds of outline and area of a region whose hull is taken
 _TOLERANCE = 0.025  # of the corners of an outline, as a share of its length
 _MAXIMUM_CORNERS = 14  # of the polygon of an outline
@@ -48,6 +47,7 @@ class _Region(NamedTuple):
     outline: np.ndarray  # (n, 2), its outermost pixels
     length: float  # of its outline, or of that of its hull, px
     area: float  # with its holes, px^2
+    growth: float  # distance of its outermost pixels from the edge, px
 
 
 def find_quadrilaterals(gray: np.ndarray) -> np.ndarray:
@@ -56,7 +56,7 @@ def find_quadrilaterals(gray: np.ndarray) -> np.ndarray:
     They are clockwise in the image, and known to about half a pixel.
     """
     window = np.ones((_WINDOW, _WINDOW), np.uint8)
-    found = [np.zeros((0, 4, 2, 2))]
+    traced = []
     for table, growth in _SCALES:
         values = cv2.LUT(gray, table)
         low, high = cv2.erode(values, window), cv2.dilate(values, window)
@@ -64,15 +64,19 @@ def find_quadrilaterals(gray: np.ndarray) -> np.ndarray:
         height = cv2.subtract(high, low)
         _, step = cv2.threshold(height, _MINIMUM_STEP, 255, cv2.THRESH_BINARY)
         dark = cv2.bitwise_and(cv2.compare(values, middle, cv2.CMP_LT), step)
-        outlines = _outlines(dark)
-        for some, lost in ((outlines, 0.0), (_parted(dark, outlines), 1.0)):
-            regions = [region for outline in some if (region := _region(outline))]
-            sides, four = _four_sides(regions)
-            areas = np.array([regions[index].area for index in four])
-            bordered = _bordered(values, sides, areas)
-            chosen = [regions[index] for index in four[bordered]]
-            found.append(_fitted(chosen, sides[bordered], growth + lost))
-    lines = np.concatenate(found)
+        traced.append((dark, growth))
+    # Squares that touch at their corners, such as those of an AprilGrid, hang together by a few
+    # pixels. Without their outermost pixels they do not.
+    traced.append((cv2.erode(dark, np.ones((3, 3), np.uint8)), growth + 1))
+    regions = [
+        region
+        for dark, growth in traced
+        for outline in _outlines(dark)
+        if (region := _region(outline, growth))
+    ]
+    sides, four = _four_sides(regions)
+    bordered = _bordered(values, sides, np.array([regions[index].area for index in four]))
+    lines = _fitted([regions[index] for index in four[bordered]], sides[bordered])
     before = np.roll(lines, 1, axis=1)
     corners = meet(before[:, :, 0], before[:, :, 1], lines[:, :, 0], lines[:, :, 1])
     convex = [cv2.isContourConvex(of) for of in corners.astype(np.float32)]
@@ -86,27 +90,7 @@ def _outlines(dark: np.ndarray) -> list[np.ndarray]:
     return [of for of in large if cv2.contourArea(of, oriented=True) <= 0]
 
 
-def _parted(dark: np.ndarray, outlines: list[np.ndarray]) -> list[np.ndarray]:
-    """Return the outlines of parts of regions that hang together by a few pixels.
-
-    Squares that touch at their corners do, such as those of an AprilGrid. The parts have lost
-    their outermost pixels.
-    """
-    labels = np.zeros(dark.shape, np.int32)
-    thick = (
-        of
-        for of in outlines
-        if len(of) >= 2 * _SHORTEST * _SMALLEST and cv2.contourArea(of) >= _THICK * len(of)
-    )
-    for label, outline in enumerate(thick, start=1):
-        cv2.drawContours(labels, [outline], 0, label, cv2.FILLED)
-    parts = _outlines(cv2.erode(dark * (labels > 0), np.ones((3, 3), np.uint8)))
-    whole = [labels[of[0, 0, 1], of[0, 0, 0]] for of in parts]
-    count = np.bincount(whole, minlength=1)
-    return [of for of, label in zip(parts, whole, strict=True) if count[label] > 1]
-
-
-def _region(outline: np.ndarray) -> _Region | None:
+def _region(outline: np.ndarray, growth: float) -> _Region | None:
     """Return the region in an outline if it may have four straight sides."""
     area = cv2.contourArea(outline)
     length = cv2.arcLength(outline, closed=True)
@@ -124,7 +108,7 @@ def _region(outline: np.ndarray) -> _Region | None:
         return None
     if cv2.contourArea(polygon, oriented=True) < 0:
         polygon = polygon[::-1]
-    return _Region(polygon, outline[:, 0], length, area)
+    return _Region(polygon, outline[:, 0], length, area, growth)
 
 
 def _bordered(values: np.ndarray, sides: np.ndarray, regions: np.ndarray) -> np.ndarray:
@@ -200,7 +184,7 @@ def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
 
 
-def _fitted(regions: list[_Region], sides: np.ndarray, growth: float) -> np.ndarray:
+def _fitted(regions: list[_Region], sides: np.ndarray) -> np.ndarray:
     """Return the ends of lines fitted to the points near four sides of regions, (k, 4, 2, 2).
 
     Regions are left out that have a side with few points.
@@ -208,11 +192,11 @@ def _fitted(regions: list[_Region], sides: np.ndarray, growth: float) -> np.ndar
     fitted = [np.zeros((0, 4, 2, 2))]
     for start in range(0, len(regions), _TOGETHER):
         some = slice(start, start + _TOGETHER)
-        fitted.append(_lines(regions[some], sides[some], growth))
+        fitted.append(_lines(regions[some], sides[some]))
     return np.concatenate(fitted)
 
 
-def _lines(regions: list[_Region], sides: np.ndarray, growth: float) -> np.ndarray:
+def _lines(regions: list[_Region], sides: np.ndarray) -> np.ndarray:
     counts = [len(region.outline) for region in regions]
     first = np.cumsum([0, *counts[:-1]])
     points = np.concatenate([region.outline for region in regions]).astype(np.float64)
@@ -242,7 +226,8 @@ def _lines(regions: list[_Region], sides: np.ndarray, growth: float) -> np.ndarr
     middle, across = total(places) / count, total(offsets) / count
     places -= of_points(middle)
     slope = total(places * offsets) / np.maximum(total(places**2), 1e-9)
-    ends = np.stack([across + slope * (end - middle) + growth for end in (-0.5, 0.5)], axis=2)
+    across += np.array([region.growth for region in regions])[:, None]
+    ends = np.stack([across + slope * (end - middle) for end in (-0.5, 0.5)], axis=2)
     lines = sides + ends[..., None] * normals[:, :, None]
     fitted: np.ndarray = lines[count.min(axis=1) >= _FEWEST]
     return fitted

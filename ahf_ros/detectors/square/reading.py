@@ -23,7 +23,9 @@ from ahf_ros.features.sampling import sample
 from ahf_ros.imaging.logarithm import LOG_OFFSET
 
 _IN_CELL = (-0.2, 0.2)  # where a cell is sampled, from its centre, in cells
-_BLUR = 0.7  # of the image, standard deviation in px
+_BLURS = 0.7, 0.4  # of a usual image and of a sharp one, standard deviations in px
+_SMALL_CELL = 2.0  # below which they differ, px
+_SMALLEST_CELL = 1.0  # that can be read, px
 _MOST_MIXED = 0.2  # share that a cell takes from each neighbour, at most
 _REACH = 0.25  # standard deviation of the window that levels are taken from, in sides
 _MINIMUM_STEP = 0.35  # from ink to paper, in the logarithm
@@ -64,17 +66,19 @@ def read(gray: np.ndarray, corners: np.ndarray, groups: Sequence[Sequence[str]])
     doubt = _SEVERAL * log(len(groups))
     frames = _frames(corners)
     bordered = np.flatnonzero(_dark_inside(gray, frames, _DEPTH))
+    sizes = np.sqrt([cv2.contourArea(of.astype(np.float32)) for of in corners])
     grids = [
         {(words(group[0]).shape[1], border) for border in borders(group[0])} for group in groups
     ]
     for cells, border in sorted(set().union(*grids)):
-        some = bordered
+        some = bordered[sizes[bordered] >= _SMALLEST_CELL * (cells + 2 * border)]
         if border > 1:
             innermost = (border - 0.5) / (cells + 2 * border)
             some = some[_dark_inside(gray, frames[some], innermost)]
         if not len(some):
             continue
-        evidence, against, which = _evidence(gray, frames[some], corners[some], cells, border)
+        places = frames[some], corners[some], sizes[some]
+        evidence, against, which = _evidence(gray, *places, cells, border)
         which = some[which]
         for index, group in enumerate(groups):
             if (cells, border) not in grids[index] or not len(which):
@@ -165,12 +169,18 @@ def _dark_inside(gray: np.ndarray, frames: np.ndarray, depth: float) -> np.ndarr
 
 
 def _evidence(
-    gray: np.ndarray, frames: np.ndarray, corners: np.ndarray, cells: int, border: int
+    gray: np.ndarray,
+    frames: np.ndarray,
+    corners: np.ndarray,
+    sizes: np.ndarray,
+    cells: int,
+    border: int,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return what the cells of quadrilaterals within a border say, and indices of these.
 
     It is by how much the logarithmic odds of a marker grow where a cell is paper, shape
-    (k, cells^2), and what they are where all cells are ink, (k,).
+    (k, cells^2), and what they are where all cells are ink, (k,). Those with small cells are there
+    twice, once as in a sharp image.
     """
     side = cells + 2 * border
     places = (np.arange(side + 2) - (side + 1) / 2) / side
@@ -186,8 +196,11 @@ def _evidence(
         ],
         np.float64,
     ).reshape(-1, len(frames), size, size)
-    whole = _unmixed(parts.mean(axis=0), corners, side)
-    logs = np.log(parts + LOG_OFFSET).reshape(len(parts), len(frames), -1)
+    small = np.flatnonzero(sizes < _SMALL_CELL * side)
+    tried = np.concatenate([np.arange(len(frames)), small])
+    blurs = np.repeat(_BLURS, [len(frames), len(small)])
+    whole = _unmixed(parts.mean(axis=0)[tried], corners[tried], side, blurs)
+    logs = np.log(parts + LOG_OFFSET).reshape(len(parts), len(frames), -1)[:, tried]
     values = np.log(np.maximum(whole, 0) + LOG_OFFSET)
     rings = _rings(cells, border)
     flat = values.reshape(len(values), -1)
@@ -209,7 +222,7 @@ def _evidence(
     around = _BORDER_WEIGHT * against[:, rings.border].sum(axis=1)
     around += _CORNER_WEIGHT * against[:, rings.corners].sum(axis=1)
     paper = np.einsum('p,pkc->kc', weights, odds)[:, rings.inside]
-    return paper.astype(np.float32), against[:, rings.inside].sum(axis=1) + around, which
+    return paper.astype(np.float32), against[:, rings.inside].sum(axis=1) + around, tried[which]
 
 
 @dataclass(frozen=True, slots=True)
@@ -240,14 +253,14 @@ def _rings(cells: int, border: int) -> _Rings:
     return _Rings(ink, paper, around, corners, inside, weights)
 
 
-def _unmixed(values: np.ndarray, corners: np.ndarray, side: int) -> np.ndarray:
-    """Return the gray values of cells, shape (k, n, n), without what blur mixed into them."""
+def _unmixed(values: np.ndarray, corners: np.ndarray, side: int, blurs: np.ndarray) -> np.ndarray:
+    """Return the gray values of cells, shape (k, n, n), without what blurs mixed into them."""
     lengths = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2) / side
     count = values.shape[1]
     neighbours = np.eye(count, k=1) + np.eye(count, k=-1)
     neighbours[0, 0] = neighbours[-1, -1] = 1
     across, down = (
-        np.array([(1 - erf(cell / (2 * sqrt(2) * _BLUR))) / 2 for cell in of])
+        np.array([(1 - erf(share / (2 * sqrt(2)))) / 2 for share in of / blurs])
         for of in ((lengths[:, 0] + lengths[:, 2]) / 2, (lengths[:, 1] + lengths[:, 3]) / 2)
     )
     mixed = [

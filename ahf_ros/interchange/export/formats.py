@@ -6,7 +6,7 @@ imported where it is used.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path, PurePath
 from pkgutil import resolve_name
@@ -16,6 +16,7 @@ from ahf_ros.interchange.files import write_whole
 
 if TYPE_CHECKING:
     from ahf_ros.interchange.export.survey import Control, MeasuredImage
+    from ahf_ros.orientation.solution import Solution
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,6 +46,23 @@ FORMATS: Mapping[str, Format] = {
     'csv': Format('interchange.export.tables:csv_files', 0.0, paths=True),
 }
 
+NETWORK_FORMATS: Mapping[str, str] = {
+    'colmap': 'interchange.export.colmap:colmap_model_files',
+    'metashape': 'interchange.export.xml_files:metashape_network_files',
+    'mmvii': 'interchange.export.xml_files:mmvii_network_files',
+}
+"""What makes the files of an adjusted network in each format: module below `ahf_ros`, function."""
+
+
+def parsed_export(text: str, formats: Collection[str]) -> tuple[str, Path]:
+    """Return format and folder of a text such as 'odm=out/odm', or raise a ValueError."""
+    name, _, folder = text.partition('=')
+    if name not in formats or not folder:
+        raise ValueError(
+            f'export is {text!r}, accepted is FORMAT=DIR with a format of {", ".join(formats)}'
+        )
+    return name, Path(folder)
+
 
 @dataclass(frozen=True, slots=True)
 class Export:
@@ -56,12 +74,7 @@ class Export:
     @classmethod
     def parsed(cls, text: str) -> Export:
         """Return the export that a text such as 'odm=out/odm' is, or raise a ValueError."""
-        name, _, folder = text.partition('=')
-        if name not in FORMATS or not folder:
-            raise ValueError(
-                f'export is {text!r}, accepted is FORMAT=DIR with a format of {", ".join(FORMATS)}'
-            )
-        return cls(name, Path(folder))
+        return cls(*parsed_export(text, FORMATS))
 
     def check_names(self, paths: Iterable[str]) -> None:
         """Raise a ValueError if the format could not tell two images apart."""
@@ -89,7 +102,27 @@ class Export:
         self.check_names(image.path for image in images)
         kind = FORMATS[self.format]
         survey = make_survey(images, control if kind.control else None, kind.origin)
-        files = resolve_name(f'ahf_ros.{kind.writer}')(survey)
-        for name, content in files.items():
-            write_whole(self.folder / name, content)
-        return tuple(self.folder / name for name in files)
+        return _written(self.folder, resolve_name(f'ahf_ros.{kind.writer}')(survey))
+
+
+def write_network_export(format_name: str, folder: Path, solution: Solution) -> tuple[Path, ...]:
+    """Write a network for other software, each file as a whole, and return the paths.
+
+    A ValueError says what the format cannot hold, or which file cannot be written.
+    """
+    solution.check_forward()
+    names = [PurePath(it).name for it in solution.network.photographs]
+    if len(set(names)) < len(names) and format_name != 'colmap':
+        raise ValueError(
+            f'{format_name} knows images by their names, accepted are different names in all '
+            'folders'
+        )
+    writer = NETWORK_FORMATS[format_name]
+    return _written(folder, resolve_name(f'ahf_ros.{writer}')(solution))
+
+
+def _written(folder: Path, files: Mapping[str, bytes]) -> tuple[Path, ...]:
+    """Write files to a folder, each as a whole, and return their paths."""
+    for name, content in files.items():
+        write_whole(folder / name, content)
+    return tuple(folder / name for name in files)

@@ -15,7 +15,9 @@ from ahf_ros.interchange.files import checked_file_name
 from ahf_ros.interchange.target_json import json_lines, targets_from_json
 from ahf_ros.target import UNDECODED, Target
 from ahf_ros.target_check import checked_integer
-from ahf_ros.text import shown
+from ahf_ros.text import listed, shown
+
+_NAMED = 10  # labels in a message
 
 MAXIMUM_SIDE = 2**15
 """Maximum side of an image, px."""
@@ -160,16 +162,10 @@ def notes_on(control: Control, survey: Survey) -> list[str]:
     unseen = [label for label, point in control.points.items() if id(point) not in used]
     without = [label for label in survey.labels if label not in survey.control]
     if unseen:
-        notes.append(f'control points that no image shows: {listed(unseen)}')
+        notes.append(f'control points that no image shows: {listed(unseen, _NAMED)}')
     if without:
-        notes.append(f'targets that are no control points: {listed(without)}')
+        notes.append(f'targets that are no control points: {listed(without, _NAMED)}')
     return notes
-
-
-def listed(labels: Sequence[str]) -> str:
-    """Return the first ten labels of a list, and the number of the others."""
-    more = f' and {len(labels) - 10} more' if len(labels) > 10 else ''
-    return ', '.join(labels[:10]) + more
 
 
 def _photograph(
@@ -212,7 +208,8 @@ def _control_points(
             found[label] = point
     if not found:
         raise ValueError(
-            f'no control point is a target of the images: the list has {listed(list(points))}, '
-            f'the images show {listed(list(labels.values()))}'
+            'no control point is a target of the images: the list has '
+            f'{listed(list(points), _NAMED)}, the images show '
+            f'{listed(list(labels.values()), _NAMED)}'
         )
     return {label: found[label] for label in labels.values() if label in found}
