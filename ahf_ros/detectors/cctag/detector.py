@@ -38,6 +38,7 @@ _COMMON_CENTRE = (8.0, 11.3), (11.3, 20.0)  # radii of targets whose rings vote 
 _COMMON_CENTRE_STEP, _COMMON_CENTRE_VOTES, _COMMON_CENTRE_SIZES = 1.0, 1.0, 1.25
 _FAINT = 3.0  # of their contrast, which narrow rings have little of
 _TELLING = 0.98  # confidence of targets that tell of others
+_SURE = 0.999  # confidence of targets that neither rivals nor another family put in doubt
 _PROBABLE = 0.5  # confidence of targets that tell of edges together
 _ROUNDS = 2  # in which doubtful targets are read with what others tell
 _POSSIBLE = 0.01  # probability of a target, from which it is read again
@@ -170,14 +171,14 @@ def _single(rings: Aligned) -> Aligned:
     """
     odds = rings.confidence / np.maximum(1 - rings.confidence, 1e-9)
     rivals = (rings.ids[:, None] == rings.ids) & ~_near(rings.frames, rings.frames)
-    of_rivals = rivals @ np.where(rings.confidence < _TELLING, odds, 0.0)
+    of_rivals = rivals @ np.where(rings.confidence < _SURE, odds, 0.0)
     single = odds / (1 + odds + of_rivals) >= _CERTAIN
     return rings.select(single | (rings.confidence < _CERTAIN))
 
 
 def _owning(gray: np.ndarray, rings: Aligned, polarity: int, family: CircleFamily) -> Aligned:
     """Return the readings less those of doubtful targets that another family explains better."""
-    doubtful = np.flatnonzero((rings.of_target >= _CERTAIN) & (rings.confidence < _TELLING))
+    doubtful = np.flatnonzero((rings.of_target >= _CERTAIN) & (rings.confidence < _SURE))
     beaten = np.zeros(len(rings.ids), bool)
     for name in CCTAG_NAMES:
         if name == family.name:

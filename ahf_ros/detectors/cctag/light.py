@@ -35,9 +35,9 @@ _PAPER = 2 * int(np.searchsorted(_RADII[_FEW], 1.16))  # radii from there on sho
 _SIZES = 1.1  # ratio of radii that share the edges of a first look
 _OFFSETS = np.arange(-1.2, 1.21, 0.1)
 _STRAIGHT, _CURVED, _CURVATURE = 16, 24, 0.7
-_FIRST = 40  # edges that are tried with all others
+_FIRST = 12  # edges that are tried with all others
 _SHOWN = 0.15  # length of an edge that is looked for, of the longest
-_ROUNDS = 5
+_ROUNDS = 4
 _DEVIATIONS = 0.3, 0.3, 0.4, 0.3  # of direction, offset, curvature and ln of width
 _USUAL_MOVES = 1e-3  # weight of none
 _MOST_CURVED, _MOST_MOVED = 1.2, 0.2  # the latter in a round
@@ -245,10 +245,9 @@ def _first_look(rest: np.ndarray, size: np.ndarray, count: int) -> np.ndarray:
         if count == 1:
             best[some, 0] = edges[np.abs(gain).argmax(axis=1)]
             continue
-        alike = steps @ steps.T
         first = np.argpartition(-np.abs(gain), _FIRST, axis=1)[:, :_FIRST]
         for row, own, tried in zip(some, gain, first, strict=True):
-            of, one = alike[tried], own[tried, None]
+            of, one = steps[tried] @ steps.T, own[tried, None]
             both = (one**2 + own**2 - 2 * of * one * own) / np.maximum(1 - of**2, 0.1)
             index, second = np.unravel_index(both.argmax(), both.shape)
             best[row] = edges[[tried[index], second]]

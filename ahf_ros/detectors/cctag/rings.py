@@ -47,7 +47,7 @@ _ENOUGH = 4  # certain targets, that tell of the edges of an image
 _SCALES = (0.93, 0.965, 1.0, 1.035, 1.07)  # of the radius, about a frame
 _READINGS = 5  # IDs that are brought onto the image from a frame
 _REPEATS, _STAYING = 6, 0.1  # until the square of a move is a small part of the variance
-_OUTLIERS = 12.0, 8.0, 5.0, 3.0, 3.0  # deviations that quarter a weight, in rounds of Gauss-Newton
+_OUTLIERS = 12.0, 6.0, 3.0, 3.0  # deviations that quarter a weight, in rounds of Gauss-Newton
 _MAXIMUM_CHANGE = 0.08  # of a frame in a round, radii
 _PERSPECTIVE = 5e-4  # change of scale along a px where tilted by 45 degrees: 1 / focal length, px
 _LEAST_TILT = 0.1  # tangent of the tilt that a circular target may have
@@ -66,7 +66,7 @@ _BY_SIZE, _USUAL_SIZE = 2.5, 12.0  # what `plain` grows by ln of the radius, fro
 _AS_CLEAR = -6.0  # as it gets, by anything that is round
 _HOPELESS = 1e-6, 1e-4  # probabilities of a target, up to which one ID and few IDs are enough
 _FEW_READINGS = 2  # IDs that are brought onto the image before the others
-_OF_ID = np.array([-0.9, 2.2])  # of one, margin
+_OF_ID = np.array([-1.4, 1.2])  # of one, margin
 
 
 @dataclass(frozen=True, slots=True)
