@@ -27,7 +27,7 @@ from ahf_ros.interchange.target_json import to_json
 from ahf_ros.session import create_identifier
 from ahf_ros.session_settings import IdentificationSettings
 from ahf_ros.stream import identify_parts, refusal
-from ahf_ros.target import Identification
+from ahf_ros.target import UNDECODED, Identification, Target, UndecodedTarget
 
 
 def identify_images(task: ImageTask, report: Report = no_report) -> ImageOutcome:
@@ -175,10 +175,19 @@ def _messages(
 
 def _lines(found: Identification, detector: str) -> Iterator[Message]:
     for target in found.targets:
-        why = doubt(target, detector)
         yield Message(
             f'{target.id:>8} {target.family:<11} {target.x:10.3f} {target.y:10.3f} px'
             f'  semi-axes {target.semi_major:.2f} {target.semi_minor:.2f} px'
-            f'  confidence {target.confidence:.3f}{f", doubtful: {why}" if why else ""}',
+            f'  confidence {target.confidence:.3f}{_remark(target, detector)}',
             Level.DETAIL,
         )
+
+
+def _remark(target: Target, detector: str) -> str:
+    """Return why a target is doubtful or not decoded, after a comma; nothing for others."""
+    if isinstance(target, UndecodedTarget):
+        likely = target.likely_id != UNDECODED
+        word = f', likely {target.likely_id} of {target.likely_family}' if likely else ''
+        return f', {target.reason}{word}'
+    why = doubt(target, detector)
+    return f', doubtful: {why}' if why else ''

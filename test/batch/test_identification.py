@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import itertools
 import signal
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from ahf_ros import ending
@@ -60,3 +62,15 @@ def test_an_error_of_a_detector_costs_its_image_only(
     outcome = identify_images(task)
     assert outcome.failed and outcome.records == ()
     assert outcome.messages[0].text == f'{task.name}: ZeroDivisionError: of a detector'
+
+
+def test_targets_that_are_not_decoded_have_their_reason(tmp_path: Path) -> None:
+    image = render(replace(SCENE, light='normal')).image
+    write_image(tmp_path / 'twice.png', np.hstack([image, image]))
+    settings = updated(
+        IdentificationSettings(), {'family': SCENE.family, 'report_undecoded': True}
+    )
+    outcome = identify_images(ImageTask((str(tmp_path / 'twice.png'),), settings))
+    lines = [it.text for it in outcome.messages if 'contested' in it.text]
+    assert len(lines) == 6
+    assert all(', contested, likely ' in line and line.endswith(SCENE.family) for line in lines)

@@ -161,7 +161,10 @@ def test_no_message_is_lost_at_100_hz_and_poses_are_those_of_the_camera(
     cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
     turn = np.eye(3) + 2 * w * cross + 2 * cross @ cross
     assert np.abs(turn - of.true.rotation).max() < 0.01
-    assert node.process.end() == (0, '')
+    status, said = node.process.end()
+    # The calibration may come after the first targets.
+    assert status == 0
+    assert all('no camera_info has come' in line for line in said.splitlines())
 
 
 @pytest.fixture(scope='module')

@@ -294,7 +294,7 @@ def _learn(bands: Bands) -> tuple[np.ndarray, LearntFamily]:
         best, at = np.unravel_index(total.argmax(), total.shape)
         # Targets that another number of bits explains far better are of another family.
         own = scores[best, at] > scores[:, at].max(axis=0) - _OTHER
-    bits, growth = counts[int(best)], float(_GROWTH[at])
+    bits, growth = counts[int(best)], _peak(_GROWTH, scores[best][:, own].sum(axis=1))
     some = bands.select(own)
     words, clear = _words(some, bits, growth)
     different, count = np.unique(words[clear], return_counts=True)
@@ -312,6 +312,15 @@ def _learn(bands: Bands) -> tuple[np.ndarray, LearntFamily]:
         likely=likely,
     )
     return np.flatnonzero(own), found
+
+
+def _peak(at: np.ndarray, values: np.ndarray) -> float:
+    """Return where evenly spaced values, (n,), have their maximum, by the parabola through it."""
+    best = int(np.clip(values.argmax(), 1, len(at) - 2))
+    before, there, after = values[best - 1 : best + 2]
+    bend = max(2 * there - before - after, 1e-9)
+    aside = np.clip((after - before) / (2 * bend), -0.5, 0.5)
+    return float(at[best] + aside * (at[1] - at[0]))
 
 
 def _printed(bands: Bands, growth: float) -> tuple[float, float]:
