@@ -133,9 +133,18 @@ def _identified(
 ) -> tuple[Aligned, np.ndarray]:
     """Return the readings of targets of one colour, and the image of light that they are of.
 
-    Doubtful targets are read with what certain ones show.
+    A first reading knows one edge of light. Where it shows likely targets, all are read with more,
+    and doubtful ones with what certain ones show.
     """
+    rings = identify(gray, frames, polarity, family, edges=1)
+    if not (rings.of_target >= _SURE_OF_TARGET).any():
+        return rings.select(rings.of_target >= _POSSIBLE), gray
+    first = rings.select(rings.confidence >= _TELLING)
     rings = identify(gray, frames, polarity, family)
+    certain = rings.select(rings.confidence >= _CERTAIN)
+    first = first.select(_alone(first.frames, certain.frames))
+    rings = rings.select(_alone(rings.frames, first.frames))
+    rings = Aligned.joined([rings, first])
     rings = rings.select(rings.of_target >= _POSSIBLE)
     likely = rings.select(rings.of_target >= _SURE_OF_TARGET)
     light = in_light(gray, likely, family)
@@ -149,7 +158,7 @@ def _identified(
             break
         known, news = prior, False
         told = likely.confidence >= _TELLING
-        unread = frames[~_near(frames, likely.frames).any(axis=1)]
+        unread = frames[_alone(frames, likely.frames)]
         doubtful = np.concatenate([likely.frames[~told], unread])
         again = identify(light, doubtful, polarity, family, prior)
         certain = likely.select(told)
@@ -162,6 +171,11 @@ def _near(frames: np.ndarray, others: np.ndarray) -> np.ndarray:
     away = np.hypot(*(frames[:, None, :2, 2] - others[None, :, :2, 2]).transpose(2, 0, 1))
     near: np.ndarray = away < _SAME_PLACE * frame.mean_radii(others)
     return near
+
+
+def _alone(frames: np.ndarray, others: np.ndarray) -> np.ndarray:
+    """Return whether targets, (k, 3, 3), are at the place of no other, (n, 3, 3), shape (k,)."""
+    return np.logical_not(_near(frames, others).any(axis=1))
 
 
 def _single(rings: Aligned) -> Aligned:

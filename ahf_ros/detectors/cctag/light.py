@@ -27,7 +27,7 @@ _MOVES = (0, 1, 3, 4)  # of a frame, that change what is on a circle
 _AROUND = frame.displacement_basis(_ANGLES, np.ones(len(_ANGLES)))[:, _MOVES].T[..., None]
 _AROUND = (_AROUND * np.stack([np.ones_like(_RADII)] * 2 + [_RADII] * 2)[:, None]).astype('f4')
 _OTHERS = 6  # heights that are not of edges: slopes and moves
-_EDGES = 3
+EDGES = 3
 _WIDTH, _SHARPEST = 1.15, 0.05  # standard deviation of an edge, px, and in radii, for samples
 _LENS = 0.75  # blur after light and ink have met, px
 _FEW = np.s_[..., ::2]  # radii, for a first look
@@ -78,10 +78,13 @@ class Lights(ArrayRecord):
         return np.exp(light.clip(-_MOST_LIGHT, _MOST_LIGHT))
 
     @staticmethod
-    def about(gray: np.ndarray, frames: np.ndarray) -> Lights:
-        """Return the light about targets whose frames, (k, 3, 3), are known to about a tenth."""
+    def about(gray: np.ndarray, frames: np.ndarray, most: int = EDGES) -> Lights:
+        """Return the light about targets whose frames, (k, 3, 3), are known to about a tenth.
+
+        It has so many edges at the most.
+        """
         count, size = len(frames), frame.mean_radii(frames)
-        edges, heights = np.zeros((count, _EDGES, 5)), np.zeros((count, _OTHERS + _EDGES))
+        edges, heights = np.zeros((count, EDGES, 5)), np.zeros((count, _OTHERS + EDGES))
         slope, left = np.zeros((count, len(_RADII)), np.float32), np.zeros(count)
         if count:
             scene = _Scene.of(gray, frames, size)
@@ -90,7 +93,7 @@ class Lights(ArrayRecord):
             tilt = np.einsum('ks,smn->kmn', fit.heights[:, :2], np.stack([_X, _Y]))
             plain = _less_means(scene.values - tilt, scene.weight, _PAPER)
             rows = np.arange(count)
-        for number in range(_EDGES if count else 0):
+        for number in range(most if count else 0):
             if number < 2:
                 first = _first_look(plain[rows], size[rows], number + 1)
             else:

@@ -15,7 +15,7 @@ from itertools import product
 import numpy as np
 
 from ahf_ros.codes.cctag import CircleFamily
-from ahf_ros.detectors.cctag.light import Lights, lit
+from ahf_ros.detectors.cctag.light import EDGES, Lights, lit
 from ahf_ros.detectors.cctag.rays import (
     ALONG,
     ANGLES,
@@ -268,11 +268,15 @@ def identify(
     polarity: int,
     family: CircleFamily,
     prior: Prior = _USUAL,
+    edges: int = EDGES,
 ) -> Aligned:
-    """Return the best reading of each target about outermost circles, known to about a tenth."""
+    """Return the best reading of each target about outermost circles, known to about a tenth.
+
+    The light about each has so many edges at the most.
+    """
     if not len(frames):
         return NOTHING
-    lights = Lights.about(gray, frames)
+    lights = Lights.about(gray, frames, edges)
     lights = lights.select(lights.uneven < _UNEVEN)
     if not len(lights.frames):
         return NOTHING
@@ -280,7 +284,7 @@ def identify(
     # The likeliest ID often brings the frame to its place even if it is the wrong one.
     first = align(gray, starts[:, 0], ids[:, 0], shift[:, 0], family, prior, lights)
     likely = first.of_target > _HOPELESS[0]
-    lights = Lights.about(gray, first.frames[likely])
+    lights = Lights.about(gray, first.frames[likely], edges)
     again = _likely_ids(gray, lights, polarity, family, prior)
     starts, ids, shift = (
         np.concatenate([more, of[likely]], axis=1)
