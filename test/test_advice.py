@@ -73,6 +73,18 @@ def test_a_family_that_nobody_knows_is_to_be_learnt(tmp_path) -> None:
     assert ring_family(str(file)).bits == 9
 
 
+@pytest.mark.parametrize('family', ['metashape12', 'auto'])
+def test_ids_that_are_there_twice_are_named(family: str) -> None:
+    rendering = rendered(replace(SCENE, targets=4))
+    lines = advice(np.hstack([rendering.image] * 2), DetectorSettings(family=family))
+    assert len(lines) == 3
+    ids = {
+        f'2 targets have the ID {it.id} of metashape12: print each ID once'
+        for it in rendering.targets
+    }
+    assert set(lines) < ids
+
+
 def test_nothing_is_said_of_what_shows_nothing() -> None:
     noise = np.random.default_rng(0).integers(0, 256, (300, 400)).astype(np.uint8)
     soft = cv2.normalize(cv2.GaussianBlur(noise, (0, 0), 3), None, 0, 255, cv2.NORM_MINMAX)
