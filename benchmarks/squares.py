@@ -2,11 +2,13 @@
 
 Centres of the others are the intersections of the diagonals between their corners, OpenCV's after
 its sub-pixel refinement. Photographs have no truth: a row says how many markers each finds, and,
-where a photograph shows an AprilGrid of 6 x 6 markers as Kalibr prints it, the RMS distance of the
-centres that all such readers find from the grid, under a homography and radial distortion.
+where a photograph shows a plane grid of markers whose IDs count along its rows, the RMS distance
+of the centres that all such readers find from the grid, under a homography and radial distortion.
+The usual grid is the AprilGrid of 6 x 6 markers that Kalibr prints.
 pupil-apriltags is left out where it is not installed. Seeds from 101 on are for tests.
 
-    python -m benchmarks.squares [--seeds 301 302] [--photographs FOLDER] [--output FILE]
+    python -m benchmarks.squares [--seeds 301 302] [--photographs FOLDER]
+        [--grid COLUMNSxROWS] [--output FILE]
 """
 
 from __future__ import annotations
@@ -30,7 +32,6 @@ from benchmarks import report
 from benchmarks.report import number
 
 FAMILY = 'apriltag_36h11'
-GRID = frozenset(range(36))
 SCENES: dict[str, dict[str, Any]] = {
     'even light': {},
     'tilt 45 deg': {'tilt': 45.0},
@@ -104,26 +105,28 @@ def measure(seeds: Sequence[int]) -> Iterator[dict[str, Any]]:
             }
 
 
-def photographed(folder: Path) -> Iterator[dict[str, Any]]:
+def photographed(folder: Path, columns: int, rows: int) -> Iterator[dict[str, Any]]:
     """Yield how many markers each reader finds in the photographs of a folder, and its RMS, px."""
+    of_grid = frozenset(range(columns * rows))
     found = readers()
     for path in sorted(path for path in folder.iterdir() if path.suffix in ('.jpg', '.png')):
         image = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE)
         read = {name: {it.id: (it.x, it.y) for it in of(image)} for name, of in found.items()}
-        grids = {name: of for name, of in read.items() if GRID.issuperset(of) and len(of) > 12}
+        grids = {name: of for name, of in read.items() if of_grid.issuperset(of) and len(of) > 12}
         common = sorted(set.intersection(*map(set, grids.values()))) if grids else []
         row: dict[str, Any] = {'scene': path.name}
         for name, places in read.items():
             seen = np.array([places[number] for number in common]) if name in grids else None
-            rms = None if seen is None else grid_rms(np.array(common), seen, image.shape[:2])
+            fitted = (np.array(common), columns, seen, image.shape[:2])
+            rms = None if seen is None else grid_rms(*fitted)
             row |= {name: len(places), f'{name}, RMS, px': number(rms, 3)}
         yield row
 
 
-def grid_rms(ids: np.ndarray, places: np.ndarray, shape: tuple[int, int]) -> float:
-    """Return the RMS distance per coordinate, px, of centres (n, 2) from an AprilGrid."""
-    rows, columns = np.divmod(ids, 6)
-    grid = np.stack([columns, rows], axis=1) - 2.5
+def grid_rms(ids: np.ndarray, columns: int, places: np.ndarray, shape: tuple[int, int]) -> float:
+    """Return the RMS distance per coordinate, px, of centres (n, 2) from a grid of markers."""
+    row, column = np.divmod(ids, columns)
+    grid = np.stack([column, row], axis=1) - (columns - 1) / 2
     middle, size = (np.array(shape[::-1]) - 1) / 2, shape[1] / 2
     aim = (places - middle) / size
     first, _ = cv2.findHomography(grid, aim)
@@ -160,11 +163,13 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """Measure and print."""
     made = report.parser(__doc__)
     made.add_argument('--photographs', type=Path, help='a folder of photographs of tag36h11')
+    made.add_argument('--grid', default='6x6', help='its columns and rows; default: %(default)s')
     options = report.parsed(made, arguments)
+    columns, rows = map(int, options.grid.split('x'))
     figures = report.about(options.seeds)
     figures['rows'] = list(measure(options.seeds))
     if options.photographs:
-        figures['photographs'] = list(photographed(options.photographs))
+        figures['photographs'] = list(photographed(options.photographs, columns, rows))
     report.publish(figures, markdown(figures), options)
 
 

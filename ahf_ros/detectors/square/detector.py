@@ -1,8 +1,7 @@
 """Identification of square markers, ArUco and AprilTag, of several dictionaries at once.
 
 Quadrilaterals are found in the image and in its halves, and read as markers by the evidence of
-their cells. Corners and centres are measured by `ahf_ros.detectors.square.sides` in the image as
-received.
+their cells. Corners and centres are measured in the image as received, by sides and prints.
 """
 
 from __future__ import annotations
@@ -14,18 +13,20 @@ from typing import Any
 
 import numpy as np
 
+from ahf_ros.blas import one_blas_thread
 from ahf_ros.codes.square import words
 from ahf_ros.detectors.contract import FamilyDetector, moved_targets
+from ahf_ros.detectors.square.prints import lay_outlines, lay_prints
 from ahf_ros.detectors.square.quadrilaterals import find_quadrilaterals
 from ahf_ros.detectors.square.reading import read
-from ahf_ros.detectors.square.sides import centres, fit_sides
+from ahf_ros.detectors.square.sides import USED, centres, fit_sides
 from ahf_ros.features.frame import reduced
 from ahf_ros.features.pyramid import halved
 from ahf_ros.imaging.image import as_gray, check_image
 from ahf_ros.target import SquareMarker, Target, sorted_targets
 
 _DRAFT_DEVIATION = 0.3  # standard deviation of a centre from corners of contours, px
-_MINIMUM_SHARE = 0.3  # of the edges on each side, for a fit to be accepted
+_SMALL = 28.0  # diagonal of a marker whose cells are not much larger than pixels, px
 _SMALLEST_HALF = 24  # smaller side of a half that markers are looked for in, px
 _SAME_PLACE = 0.3  # distance of two readings of one marker, in sides
 _LARGE = 120.0  # side of a marker whose contour gives its corners to about two pixels, px
@@ -68,6 +69,9 @@ class SquareDetector(FamilyDetector):
         corners, readings = [np.zeros((0, 4, 2))], [np.zeros((0, 4))]
         for level, half in enumerate(halved(gray, levels)):
             found = find_quadrilaterals(half)
+            if not level:  # what is small in a half is large enough here
+                small = np.linalg.norm(found[:, 2] - found[:, 0], axis=1) < _SMALL
+                found[small] = lay_outlines(half, found[small])
             read_as = read(half, found, groups)
             turned = [
                 np.roll(found[index], turn, axis=0)
@@ -104,10 +108,11 @@ class SquareDetector(FamilyDetector):
             )
         )
 
+    @one_blas_thread()
     def refine(self, image: np.ndarray, targets: Sequence[Target]) -> list[Target]:
-        """Return markers with corners and centres fitted to their sides; see `Refiner`.
+        """Return markers with corners and centres fitted to their edges; see `Refiner`.
 
-        Corners are known to about two pixels. Markers without sides in this image, and targets
+        Corners are known to about two pixels. Markers without edges in this image, and targets
         that are no `SquareMarker`, stay unchanged.
         """
         check_image(image)
@@ -117,9 +122,11 @@ class SquareDetector(FamilyDetector):
         for cells, border in dict.fromkeys(map(_grid, markers)):
             alike = [it for it in markers if _grid(it) == (cells, border)]
             corners = np.array([it.corners for it in alike])
-            sides = fit_sides(gray, _from_halves(gray, corners, cells, border), cells, border)
-            places = _places(sides.corners, sides.covariance, sides.edge_shift)
-            good = sides.share >= _MINIMUM_SHARE
+            fit = fit_sides(gray, _from_halves(gray, corners, cells, border), cells, border)
+            prints = [np.pad(words(it.family)[it.id], border) for it in alike]
+            fit = lay_prints(gray, fit, ~np.array(prints))
+            places = _places(fit.corners, fit.covariance, fit.edge_shift)
+            good = fit.share >= USED
             refined = moved_targets(refined, alike, places, good)
         return refined
 
@@ -153,7 +160,7 @@ def _from_halves(gray: np.ndarray, corners: np.ndarray, cells: int, border: int)
     for level in range(levels, 0, -1):
         which = np.flatnonzero(sides > _LARGE * 2 ** (level - 1))
         fit = fit_sides(halves[level], reduced(corners[which], level), cells, border)
-        good = fit.share >= _MINIMUM_SHARE
+        good = fit.share >= USED
         corners[which[good]] = (fit.corners[good] + 0.5) * 2**level - 0.5
     return corners
 

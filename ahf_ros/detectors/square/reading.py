@@ -18,6 +18,7 @@ import cv2
 import numpy as np
 
 from ahf_ros.codes.square import borders, words
+from ahf_ros.detectors.square.sides import square_frames
 from ahf_ros.features.frame import project
 from ahf_ros.features.sampling import sample
 from ahf_ros.imaging.logarithm import LOG_OFFSET
@@ -64,7 +65,7 @@ def read(gray: np.ndarray, corners: np.ndarray, groups: Sequence[Sequence[str]])
     """
     found = [np.zeros((0, 6))]
     doubt = _SEVERAL * log(len(groups))
-    frames = _frames(corners)
+    frames = square_frames(corners)
     bordered = np.flatnonzero(_dark_inside(gray, frames, _DEPTH))
     sizes = np.sqrt([cv2.contourArea(of.astype(np.float32)) for of in corners])
     grids = [
@@ -138,13 +139,6 @@ def _table(group: tuple[str, ...]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         np.log(np.repeat(count, 4)).astype(np.float32),
         np.repeat(_PLAIN * np.maximum(usual - edges, 0), 4),
     )
-
-
-def _frames(corners: np.ndarray) -> np.ndarray:
-    """Return homographies from the square about the origin with sides of 1, shape (k, 3, 3)."""
-    square = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]], np.float32)
-    found = [cv2.getPerspectiveTransform(square, of.astype(np.float32)) for of in corners]
-    return np.array(found).reshape(-1, 3, 3)
 
 
 def _dark_inside(gray: np.ndarray, frames: np.ndarray, depth: float) -> np.ndarray:

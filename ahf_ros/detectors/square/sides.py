@@ -55,7 +55,14 @@ _THROUGH = 0.25  # of what cells behind the border do to a centre, px, by (blur 
 _IN_CELL = (0.35, 0.5, 0.65)  # where the inner edge of the border is measured, in each cell
 _MINIMUM_INNER_EDGES = 6  # such edges; the usual one has the shift of all edges
 _THICK = 4.0  # width of cells, and so of a border, whose two edges can be separated, blurs
-_SYSTEMATIC = 0.003  # standard deviation of the effects of lens distortion and pixels, px
+SQUARE = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])
+"""Corners of the square about the origin with sides of 1."""
+
+SYSTEMATIC = 0.003
+"""Standard deviation of the effects of lens distortion and pixels on a centre, px."""
+
+USED = 0.3
+"""Share of the edges on each side from which a fit is used."""
 
 _ALONG = np.linspace(_ENDS, 1 - _ENDS, _PROFILES)  # positions of profiles along a side, 0 to 1
 _BASIS = np.stack([1 - _ALONG, _ALONG], axis=1)  # of a line, by its offsets at the ends of a side
@@ -91,6 +98,13 @@ def centres(corners: np.ndarray) -> np.ndarray:
     return meet(corners[:, 0], corners[:, 2], corners[:, 1], corners[:, 3])
 
 
+def square_frames(corners: np.ndarray) -> np.ndarray:
+    """Return homographies from the square about the origin with sides of 1, shape (k, 3, 3)."""
+    square = SQUARE.astype(np.float32)
+    found = [cv2.getPerspectiveTransform(square, of.astype(np.float32)) for of in corners]
+    return np.array(found).reshape(-1, 3, 3)
+
+
 def fit_sides(gray: np.ndarray, corners: np.ndarray, cells: int, border: int) -> Sides:
     """Return markers whose corners are the intersections of their sides.
 
@@ -99,12 +113,14 @@ def fit_sides(gray: np.ndarray, corners: np.ndarray, cells: int, border: int) ->
     gray : ndarray of float32, shape (height, width)
         Gray values from 0 to 255.
     corners : ndarray of float64, shape (k, 4, 2)
-        To about two pixels, clockwise in the image. The border of a marker is dark.
+        To about two pixels, clockwise in the image. The border of a marker is dark. Those of
+        markers whose share is less than `USED` are returned as they are.
     cells : int
         Number of cells along a side, including the border.
     border : int
         Width of the border, cells.
     """
+    rough = corners
     blur, contrast = np.full(len(corners), USUAL_BLUR), np.ones(len(corners))
     share, covariance = np.zeros(len(corners)), np.zeros((len(corners), 2, 2))
     for _ in range(_MEASUREMENTS if len(corners) else 0):
@@ -137,6 +153,7 @@ def fit_sides(gray: np.ndarray, corners: np.ndarray, cells: int, border: int) ->
     ends = np.roll(corners, -1, axis=1)
     moved = back * _normals(corners, ends)
     corners = _met(corners + moved, ends + moved)
+    corners = np.where((share >= USED)[:, None, None], corners, rough)
     return Sides(corners=corners, share=share, covariance=covariance, edge_shift=shift)
 
 
@@ -156,9 +173,7 @@ def _edge_shift(
     along = np.add.outer(np.arange(border, cells - border), _IN_CELL).ravel() / cells
     side = np.stack([along, np.full(along.size, border / cells)], axis=1) - 0.5
     turns = [np.linalg.matrix_power(np.array([[0, -1], [1, 0]]), turn) for turn in range(4)]
-    print_corners = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]], np.float32)
-    planes = [cv2.getPerspectiveTransform(print_corners, of.astype(np.float32)) for of in corners]
-    frames = np.array(planes).reshape(-1, 3, 3)
+    frames = square_frames(corners)
     points, before, inner = (
         project(frames, np.stack([(side + offset) @ turn.T for turn in turns]))
         for offset in ((0.0, 0.0), (-0.1 / cells, 0.0), (0.0, 0.9 / cells))
@@ -271,7 +286,7 @@ def _corners(
 
     corners = met(lines.offsets)
     middle = centres(corners)
-    covariance = np.tile(_SYSTEMATIC**2 * np.eye(2), (len(corners), 1, 1))
+    covariance = np.tile(SYSTEMATIC**2 * np.eye(2), (len(corners), 1, 1))
     for side in range(4):
         moved = np.repeat(lines.offsets[None], 2, axis=0)
         moved[:, :, side] += _DIFFERENCE * np.eye(2)[:, None]

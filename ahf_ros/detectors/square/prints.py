@@ -1,0 +1,257 @@
+"""Square markers from all their edges: their prints, laid over the image.
+
+Once a marker is read, its whole print is known. In even light the image is this print under a
+homography, blurred, between a level of ink and one of paper that change slowly across it. All of
+this is fitted to the gray values by least squares [1]_, in which every edge between two cells
+takes part, so that cells of a pixel and a half suffice. Blurred cells are products of normal
+distributions, which makes all derivatives exact but that of the growth of ink, which is
+proportional to the gradient of the print.
+
+What the residuals of a cell sum up to says how well a marker is determined [2]_: patterns of light
+leave residuals that stretch over cells.
+
+References
+----------
+.. [1] Baker & Matthews, Lucas-Kanade 20 years on: a unifying framework, Int. J. Comput. Vis.
+   56(3), 2004, 221-255, section 3.
+.. [2] Liang & Zeger, Longitudinal data analysis using generalized linear models, Biometrika 73(1),
+   1986, 13-22.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from ahf_ros.detectors.square.sides import (
+    SQUARE,
+    SYSTEMATIC,
+    USED,
+    Sides,
+    square_frames,
+)
+from ahf_ros.features.frame import project
+from ahf_ros.features.profiles import USUAL_BLUR
+from ahf_ros.features.robust import NORMAL, geman_mcclure
+from ahf_ros.features.sampling import sample, within
+
+_CELLS = 8  # of a marker whose cells are not known
+_MARGIN = 0.6  # of paper around a print that is looked at, cells
+_LARGEST_CELL = 12.0  # whose few edges are measured better along the sides, px
+_SAMPLES = 4  # along a cell, at most a pixel apart where it is smaller
+_OF_OUTLINE = 2  # samples along a cell of a small marker
+_ROUNDS = 10
+_LARGEST_STEP = 0.5  # of the place of a marker in a round, cells
+_SETTLED = 0.02  # the last step of a corner at most, px
+_NEAR = 2.0  # distance of corners from where they were, px, where this is more than a cell
+_SHARPEST, _SOFTEST = 0.25, 1.0  # deviation of a blur, px and cells
+_OUTLIER = 4.0  # residual that quarters the weight, in usual ones
+_USUAL_RESIDUAL = 0.3  # minimum, gray values
+_AGREES = 0.25  # residual of a sample that looks like the print, in all the contrast there is
+_ENOUGH, _HOPELESS = 0.9, 0.7  # share of such samples; where it is less, light is uneven
+_RIDGE = 1e-6  # of diagonals of normal matrices, so that they can be inverted
+_PLACE, _LEVELS = 8, 7  # unknowns of a homography; of the levels of paper and ink, and of growth
+_TOGETHER = 50_000  # samples at a time, which bounds the memory
+
+
+def lay_prints(gray: np.ndarray, sides: Sides, prints: np.ndarray) -> Sides:
+    """Return markers as their prints lie over the image, where these are better determined.
+
+    Parameters
+    ----------
+    gray : ndarray of float32, shape (height, width)
+        Gray values from 0 to 255.
+    sides : Sides
+        The k markers as their sides show them, or with corners to about a third of a cell.
+    prints : ndarray of bool, shape (k, n, n)
+        Their cells, borders included, True where there is ink.
+    """
+    corners, share = sides.corners.copy(), sides.share.copy()
+    covariance, shift = sides.covariance.copy(), sides.edge_shift.copy()
+    cells = prints.shape[1]
+    cell = _lengths(corners) / cells
+    counts = np.clip(np.ceil(cell), 1, _SAMPLES).astype(int)
+    deviation = np.where(share >= USED, np.trace(covariance, axis1=1, axis2=2), np.inf)
+    for count in np.unique(counts).tolist():
+        alike = np.flatnonzero((counts == count) & (cell <= _LARGEST_CELL))
+        places = _places(cells, count)
+        for which in _parts(alike, places):
+            found = _laid(gray, corners[which], prints[which], places, cells)
+            own = np.trace(found.covariance, axis1=1, axis2=2)
+            better = (found.share >= _ENOUGH) & (own < deviation[which])
+            which = which[better]
+            corners[which], share[which] = found.corners[better], found.share[better]
+            covariance[which], shift[which] = found.covariance[better], found.edge_shift[better]
+    return Sides(corners=corners, share=share, covariance=covariance, edge_shift=shift)
+
+
+def _blurred(prints: np.ndarray, places: np.ndarray, blur: np.ndarray) -> list[np.ndarray]:
+    """Return blurred prints and their derivatives by x, y and blur, each of shape (k, m^2).
+
+    Places along either side have the shape (m,), blurs (k,), both in sides.
+    """
+    edges = np.linspace(-0.5, 0.5, prints.shape[1] + 1)
+    deviations = (places[:, None] - edges) / blur[:, None, None]
+    density = np.exp(-(deviations**2) / 2) / np.sqrt(2 * np.pi) / blur[:, None, None]
+    shares = -np.diff(_normal(deviations))
+    of_place, of_blur = -np.diff(density), np.diff(density * deviations)
+    ink = prints.astype(np.float64)
+    along = shares @ ink, of_place @ ink, of_blur @ ink
+    turned = [np.swapaxes(of, 1, 2) for of in (shares, of_place, of_blur)]
+    blurred = (
+        along[0] @ turned[0],
+        along[0] @ turned[1],
+        along[1] @ turned[0],
+        along[2] @ turned[0] + along[0] @ turned[2],
+    )
+    return [of.reshape(len(prints), -1) for of in blurred]
+
+
+_GRID = np.linspace(-6, 6, 4097)
+_STEPS = np.exp(-(_GRID**2) / 2)
+_TABLE = np.concatenate([[0.0], np.cumsum(_STEPS[1:] + _STEPS[:-1])])
+_TABLE /= _TABLE[-1]
+
+
+def _normal(values: np.ndarray) -> np.ndarray:
+    """Return the normal distribution, to about 1e-6."""
+    return np.interp(values, _GRID, _TABLE)
+
+
+def lay_outlines(gray: np.ndarray, corners: np.ndarray) -> np.ndarray:
+    """Return the corners of quadrilaterals, shape (k, 4, 2), as the edges of dark borders show.
+
+    No cell inside is known yet. A contour, whose pixels are nearly as large as the border of a
+    small marker is wide, knows less. Quadrilaterals without a dark border stay as they are.
+    """
+    places = _places(_CELLS, _OF_OUTLINE)
+    corners = corners.copy()
+    for which in _parts(np.arange(len(corners)), places):
+        found = _laid(gray, corners[which], np.ones((len(which), 1, 1), bool), places, _CELLS)
+        good = found.share >= _ENOUGH
+        corners[which[good]] = found.corners[good]
+    return corners
+
+
+def _parts(indices: np.ndarray, places: np.ndarray) -> Iterator[np.ndarray]:
+    """Yield the indices of markers, sampled at places along either side, some at a time."""
+    size = max(1, _TOGETHER // len(places) ** 2)
+    for first in range(0, len(indices), size):
+        yield indices[first : first + size]
+
+
+def _places(cells: int, count: int) -> np.ndarray:
+    """Return places along a side, in sides, from its middle, with so many in a cell."""
+    reach = 0.5 + _MARGIN / cells
+    return np.linspace(-reach, reach, int(np.ceil((cells + 2 * _MARGIN) * count)) + 1)
+
+
+def _lengths(corners: np.ndarray) -> np.ndarray:
+    """Return the mean lengths of sides, shape (k,)."""
+    lengths: np.ndarray = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2)
+    return lengths.mean(axis=1)
+
+
+def _laid(
+    gray: np.ndarray, corners: np.ndarray, prints: np.ndarray, places: np.ndarray, cells: int
+) -> Sides:
+    """Return prints laid over the image from corners on, sampled at places along either side.
+
+    Of a print of one cell only what is inside its outline is known, by half of a marker's cell;
+    then, the growth of ink is not known.
+    """
+    down, across = (of.ravel() for of in np.meshgrid(places, places, indexing='ij'))
+    if whole := prints.shape[1] > 1:
+        known = np.full(len(across), True)
+    else:
+        known = np.maximum(np.abs(across), np.abs(down)) > 0.5 - 0.5 / cells
+    down, across = down[known], across[known]
+    grid = np.stack([across, down], axis=1)
+    frames, size = square_frames(corners), _lengths(corners)
+    blur, levels = USUAL_BLUR / size, np.zeros((len(frames), _LEVELS))
+    laid, share = corners.copy(), np.zeros(len(frames))
+    covariance, shift = np.zeros((len(frames), 2, 2)), np.zeros(len(frames))
+    active = np.arange(len(frames))
+    for number in range(_ROUNDS):
+        points = project(frames[active], grid)
+        values = sample(gray, points).astype(np.float64)
+        inside = within(points, gray.shape)
+        ink, x, y, soft = (of[:, known] for of in _blurred(prints[active], places, blur[active]))
+        linear = np.empty((*ink.shape, _LEVELS))
+        linear[..., 0], linear[..., 3], linear[..., 6] = 1, ink, whole * np.hypot(x, y)
+        linear[..., 1:3] = grid
+        linear[..., 4:6] = ink[..., None] * grid
+        if not number:
+            levels = _solved(linear, inside, values)
+        residual = values - (linear @ levels[active, :, None])[..., 0]
+        step = levels[active, 3:6] @ np.stack([np.ones_like(across), across, down])
+        usual = np.maximum(NORMAL * np.median(np.abs(residual), axis=1), _USUAL_RESIDUAL)
+        weights = geman_mcclure(inside, residual / (_OUTLIER * usual[:, None]))
+        x, y = x * step, y * step
+        moved = (x * across, x * down, x, y * across, y * down, y)
+        bent = moved[0] + moved[4]
+        columns = (*moved, -bent * across, -bent * down, -soft * step)
+        full = np.concatenate([np.stack(columns, axis=2), -linear], axis=2)
+        normal = _normal_matrix(full, weights)
+        scores = full * (weights * residual)[..., None]
+        change = -np.linalg.solve(normal, scores.sum(axis=1)[..., None])[..., 0]
+        place = np.tile(np.eye(3), (len(active), 1, 1))
+        limit = _LARGEST_STEP / cells
+        place.reshape(-1, 9)[:, :_PLACE] += np.clip(change[:, :_PLACE], -limit, limit)
+        frames[active] = frames[active] @ place
+        side = size[active]
+        softer = blur[active] + change[:, _PLACE]
+        blur[active] = np.clip(softer, _SHARPEST / side, _SOFTEST / cells)
+        levels[active] += change[:, _PLACE + 1 :]
+        there = project(frames[active], SQUARE)
+        last = np.linalg.norm(there - laid[active], axis=2).max(axis=1)
+        laid[active] = there
+        alike = (np.abs(residual) < _AGREES * np.ptp(values, axis=1)[:, None]).mean(axis=1)
+        settled = (last < _SETTLED) & inside.all(axis=1) & (step.max(axis=1) < 0)
+        which = active[settled]
+        share[which] = alike[settled]
+        covariance[which] = _covariance(
+            frames[which], normal[settled], scores[settled], grid, cells
+        )
+        shift[which] = levels[which, 6] / levels[which, 3] * size[which]
+        hopeful = (alike > _HOPELESS) | (number == 0)
+        active = active[~settled & hopeful]
+        if not active.size:
+            break
+    near = np.linalg.norm(laid - corners, axis=2).max(axis=1) < np.maximum(size / cells, _NEAR)
+    return Sides(laid, np.where(near, share, 0.0), covariance, shift)
+
+
+def _normal_matrix(columns: np.ndarray, weights: np.ndarray) -> np.ndarray:
+    normal: np.ndarray = np.swapaxes(columns * weights[..., None], 1, 2) @ columns
+    diagonal = np.einsum('kii->ki', normal)
+    diagonal += _RIDGE * diagonal + _RIDGE
+    return normal
+
+
+def _solved(columns: np.ndarray, weights: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Return the factors of columns, shape (k, m, n), that give the values, (k, n)."""
+    sums = (columns * (weights * values)[..., None]).sum(axis=1)
+    solved: np.ndarray = np.linalg.solve(_normal_matrix(columns, weights), sums[..., None])
+    return solved[..., 0]
+
+
+def _covariance(
+    frames: np.ndarray, normal: np.ndarray, scores: np.ndarray, grid: np.ndarray, cells: int
+) -> np.ndarray:
+    """Return the covariances of centres, px^2, from what the samples of each cell sum up to."""
+    column, row = np.clip(np.floor((grid.T + 0.5) * cells), -1, cells).astype(int) + 1
+    order = np.argsort(row * (cells + 2) + column, kind='stable')
+    counts = np.bincount(row * (cells + 2) + column)
+    first = np.cumsum([0, *counts[:-1]])
+    of_cells = np.add.reduceat(scores[:, order], first, axis=1)
+    inverse = np.linalg.inv(normal)
+    size = normal.shape[1]
+    freedom = (len(counts) / (len(counts) - size)) ** 2
+    of_all = inverse @ (np.swapaxes(of_cells, 1, 2) @ of_cells) @ inverse
+    centre = of_all[:, [[2, 2], [5, 5]], [[2, 5], [2, 5]]]
+    scale = frames[:, 2, 2, None, None]
+    along = frames[:, :2, :2] / scale
+    along = along - frames[:, :2, 2:] / scale * frames[:, 2:, :2] / scale
+    return freedom * along @ centre @ np.swapaxes(along, 1, 2) + SYSTEMATIC**2 * np.eye(2)
