@@ -72,10 +72,11 @@ class LocalCluster(ExitStack):
         )  # fmt: skip
 
     def _start(self, what: str, *arguments: str, **environment: str) -> subprocess.Popen[bytes]:
+        path = os.pathsep.join(filter(None, [str(ROOT), os.environ.get('PYTHONPATH')]))
         process = subprocess.Popen(
             [sys.executable, '-m', f'distributed.cli.dask_{what}', '--no-dashboard', *arguments],
             cwd=self._folder,
-            env={**os.environ, 'PYTHONPATH': str(ROOT), **environment},
+            env={**os.environ, 'PYTHONPATH': path, **environment},
             stderr=(self._folder / f'{what}.log').open('ab'),
         )
         self.callback(process.wait)
