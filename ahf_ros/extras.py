@@ -5,6 +5,9 @@ from __future__ import annotations
 from importlib.util import find_spec
 from typing import NamedTuple
 
+REQUIRED = ('numpy', 'opencv-python-headless', 'rich', 'ruamel.yaml', 'threadpoolctl')
+"""What the package needs without any extra, as pyproject.toml has it; colcon keeps no record."""
+
 
 class Extra(NamedTuple):
     """What an extra is for, and the modules that it brings."""

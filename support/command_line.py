@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import os
 import subprocess
 import sys
 from functools import partial
 
 from ahf_ros.cli import main
-from support import ROOT
+from support import environment
 
 
 def python(
@@ -19,7 +18,7 @@ def python(
         input=stdin,
         capture_output=True,
         text=True,
-        env={**os.environ, 'PYTHONPATH': str(ROOT)},
+        env=environment(),
         timeout=timeout,
     )
 

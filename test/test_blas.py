@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import subprocess
 import sys
 import threading
@@ -14,7 +13,7 @@ from threadpoolctl import ThreadpoolController
 from ahf_ros.blas import one_blas_thread
 from ahf_ros.session import create_identifier
 from ahf_ros.target import Target
-from support import ROOT
+from support import ROOT, environment
 
 MAXIMUM_RATIO = 1.2
 """Of the processor time with all threads of OpenBLAS at hand to that with one."""
@@ -34,10 +33,11 @@ print(min(times))
 """
 
 
-def processor_time(**environment: str) -> float:
+def processor_time(**changes: str) -> float:
     """Return the least processor time of an identification in a new process, s."""
-    variables = {name: it for name, it in os.environ.items() if name != 'OPENBLAS_NUM_THREADS'}
-    variables |= {'PYTHONPATH': str(ROOT), **environment}
+    variables = environment()
+    variables.pop('OPENBLAS_NUM_THREADS', None)
+    variables |= changes
     command = [sys.executable, '-c', TIMED]
     return float(subprocess.check_output(command, env=variables, cwd=ROOT))
 

@@ -33,7 +33,8 @@ def test_there_are_examples():
 
 
 @pytest.mark.parametrize('page', WITH_EXAMPLES, ids=name)
-def test_the_examples_do_what_they_say(page: Path):
+def test_the_examples_do_what_they_say(page: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.chdir(ROOT)
     results = doctest.testfile(str(page), module_relative=False)
     assert results.attempted >= 4
     assert results.failed == 0

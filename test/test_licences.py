@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import configparser
 import re
-from importlib import metadata
 
+from ahf_ros.extras import REQUIRED
 from support import ROOT
 
 
@@ -17,10 +17,9 @@ def normalized(requirement: str) -> str:
 
 def declared() -> set[str]:
     """Return the names of what the package and its nodes need to run."""
-    own = [it for it in metadata.requires('ahf_ros') or () if 'extra ==' not in it]
     distributions = configparser.ConfigParser()
     distributions.read(ROOT / 'distributions.ini')
-    return {normalized(it) for it in [*own, *distributions['jazzy']['run'].split()]}
+    return {normalized(it) for it in [*REQUIRED, *distributions['jazzy']['run'].split()]}
 
 
 def test_the_licence_of_every_dependency_is_listed() -> None:

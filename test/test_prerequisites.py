@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from support import ROOT
+from support import ROOT, environment
 from support.command_line import python
 
 SCRIPT = ROOT / 'scripts' / 'prerequisites.py'
@@ -44,11 +44,11 @@ needs_setuptools = pytest.mark.skipif(
 
 
 def without_compiler(*arguments: object) -> subprocess.CompletedProcess[str]:
-    environment = {**os.environ, 'PATH': os.devnull, 'PYTHONPATH': str(ROOT)}
+    variables = environment(PATH=os.devnull)
     for name in ('CC', 'CXX'):
-        environment.pop(name, None)
+        variables.pop(name, None)
     command = [sys.executable, *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, env=environment, cwd=ROOT)
+    return subprocess.run(command, capture_output=True, text=True, env=variables, cwd=ROOT)
 
 
 def test_a_python_without_pip_is_said() -> None:

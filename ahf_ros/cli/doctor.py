@@ -12,7 +12,7 @@ import sys
 from collections.abc import Iterator
 from importlib import metadata
 
-from ahf_ros.extras import EXTRAS, missing
+from ahf_ros.extras import EXTRAS, REQUIRED, missing
 from ahf_ros.release import release
 
 _OPENCV = tuple(
@@ -29,7 +29,6 @@ _VARIABLES = (
     *('ROS_LOCALHOST_ONLY', 'FASTDDS_DEFAULT_PROFILES_FILE', 'FASTRTPS_DEFAULT_PROFILES_FILE'),
     *('OMP_NUM_THREADS', 'OPENBLAS_NUM_THREADS', 'OPENCV_FOR_THREADS_NUM'),
 )
-_REQUIREMENT = re.compile(r'(?P<name>[\w.-]+)')
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -59,7 +58,7 @@ def _machine() -> Iterator[str]:
         f'ahf_ros {release()}, Python {platform.python_version()}, {platform.system()} '
         f'{platform.release()} {platform.machine()}, {os.cpu_count()} cores'
     )
-    for name in _required():
+    for name in REQUIRED:
         if not name.startswith('opencv'):
             yield f'{name} {_version(name) or "is missing"}'
     if importlib.util.find_spec('cv2'):
@@ -121,7 +120,7 @@ def _shared_memory() -> str:
 
 
 def _problems() -> Iterator[str]:
-    for name in _required():
+    for name in REQUIRED:
         if not _version(name) and not name.startswith('opencv'):
             yield f'{name} is missing: pip install {name}'
     several = [name for name in _OPENCV if _version(name)]
@@ -139,13 +138,6 @@ def _problems() -> Iterator[str]:
             f'ROS 2 {sourced} is sourced, and the messages in this environment are compiled for '
             'ROS 2 from PyPI: start nodes where no ROS is sourced, or leave this environment'
         )
-
-
-def _required() -> list[str]:
-    """Return the names of the packages that the package requires without any extra."""
-    lines = metadata.requires('ahf_ros') or ()
-    found = [_REQUIREMENT.match(line) for line in lines if 'extra ==' not in line]
-    return [match['name'] for match in found if match]
 
 
 def _version(name: str) -> str:

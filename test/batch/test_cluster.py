@@ -28,7 +28,7 @@ from ahf_ros.batch.cluster import DaskEngine
 from ahf_ros.batch.engine import EngineLost, TaskFailed, finished_tasks
 from ahf_ros.cli import main
 from ahf_ros.interchange.image_files import write_image
-from support import ROOT, bags
+from support import bags, environment
 from support.jobs import do_as_told
 
 LIMIT = 300.0
@@ -64,19 +64,18 @@ class LocalCluster(ExitStack):
         with distributed.Client(self.address, timeout=LIMIT, set_as_default=False) as client:
             client.wait_for_workers(count, timeout=LIMIT)
 
-    def worker(self, name: str, **environment: str) -> subprocess.Popen[bytes]:
+    def worker(self, name: str, **variables: str) -> subprocess.Popen[bytes]:
         return self._start(
             'worker', self.address, '--no-nanny', '--nthreads', '1', '--name', name,
             '--host', '127.0.0.1', '--local-directory', str(self._folder),
-            **environment,
+            **variables,
         )  # fmt: skip
 
-    def _start(self, what: str, *arguments: str, **environment: str) -> subprocess.Popen[bytes]:
-        path = os.pathsep.join(filter(None, [str(ROOT), os.environ.get('PYTHONPATH')]))
+    def _start(self, what: str, *arguments: str, **variables: str) -> subprocess.Popen[bytes]:
         process = subprocess.Popen(
             [sys.executable, '-m', f'distributed.cli.dask_{what}', '--no-dashboard', *arguments],
             cwd=self._folder,
-            env={**os.environ, 'PYTHONPATH': path, **environment},
+            env=environment(**variables),
             stderr=(self._folder / f'{what}.log').open('ab'),
         )
         self.callback(process.wait)

@@ -20,7 +20,7 @@ from ahf_ros.bag import run
 from ahf_ros.bag.definitions import typestore
 from ahf_ros.cli import main
 from ahf_ros.interchange.image_files import write_image
-from support import ROOT, bags, packages
+from support import ROOT, bags, environment, packages
 from support.command_line import status as status_of
 
 LIMIT = 300.0
@@ -29,15 +29,15 @@ RAMP = np.tile(np.arange(40, dtype=np.uint8), (30, 1))
 
 
 def start(
-    *arguments: object, path: Path = ROOT, stdout: object = subprocess.PIPE, **environment: str
+    *arguments: object, path: Path = ROOT, stdout: object = subprocess.PIPE, **variables: str
 ) -> subprocess.Popen[bytes]:
     """Start the command line, which also imports from a path."""
     command = [sys.executable, '-m', 'ahf_ros.cli', *map(str, arguments)]
     before = signal.signal(signal.SIGHUP, signal.SIG_DFL)  # also where the tests run with nohup
-    environment = {**os.environ, 'PYTHONPATH': f'{ROOT}{os.pathsep}{path}', **environment}
+    variables = environment(path, **variables)
     try:
         return subprocess.Popen(
-            command, cwd=ROOT, stdout=stdout, stderr=subprocess.PIPE, env=environment
+            command, cwd=ROOT, stdout=stdout, stderr=subprocess.PIPE, env=variables
         )
     finally:
         signal.signal(signal.SIGHUP, before)
@@ -198,12 +198,11 @@ except KeyboardInterrupt:
 
 def test_a_signal_that_an_import_would_lose_ends_the_process(tmp_path: Path) -> None:
     (tmp_path / 'interrupting.py').write_text(INTERRUPTING)
-    environment = {**os.environ, 'PYTHONPATH': f'{ROOT}{os.pathsep}{tmp_path}'}
     process = subprocess.Popen(
         [sys.executable, '-c', IMPORTING],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
-        env=environment,
+        env=environment(tmp_path),
     )
     assert end_of(process) == (130, b'', b'')
 

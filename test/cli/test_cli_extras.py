@@ -12,7 +12,7 @@ import pytest
 
 from ahf_ros import Identification
 from ahf_ros.codes.gsi import point_family, positions_of
-from ahf_ros.extras import EXTRAS, MissingExtra, missing
+from ahf_ros.extras import EXTRAS, REQUIRED, MissingExtra, missing
 from ahf_ros.interchange.network_results import write_network
 from ahf_ros.orientation.testing import unit_weight
 from support import ROOT
@@ -145,6 +145,8 @@ def test_identification_needs_no_extra(tmp_path: Path) -> None:
 
 def test_extras_are_those_of_the_package() -> None:
     text = (ROOT / 'pyproject.toml').read_text()
+    (required,) = re.findall(r'^dependencies = \[\n(.*?)^\]', text, re.MULTILINE | re.DOTALL)
+    assert tuple(re.findall(r'^  "([\w.-]*\w)', required, re.MULTILINE)) == REQUIRED
     (names,) = re.findall(r'^all = \["ahf_ros\[(.*)\]"\]$', text, re.MULTILINE)
     assert set(names.split(',')) == set(EXTRAS)
     distributions = {'PIL': 'pillow'}

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import json
-import os
 import subprocess
 import sys
 from pathlib import Path
@@ -18,7 +17,7 @@ from ahf_ros.interchange.camera_files import ros_yaml
 from ahf_ros.interchange.network_results import read_network
 from ahf_ros.interchange.robot_files import read_robot_poses
 from ahf_ros.orientation.transform import Transform
-from support import ROOT
+from support import ROOT, environment
 from support.command_line import status
 from support.networks import CALIBRATION, SIZE, records, solution
 
@@ -185,7 +184,7 @@ def test_coordinates_do_not_depend_on_the_threads_of_blas(tmp_path: Path) -> Non
     command += ['--quiet', '-o']
     tables = []
     for threads in '12':
-        variables = os.environ | {'PYTHONPATH': str(ROOT), 'OPENBLAS_NUM_THREADS': threads}
+        variables = environment(OPENBLAS_NUM_THREADS=threads)
         subprocess.run([*command, str(tmp_path / threads)], env=variables, cwd=ROOT, check=True)
         tables.append((tmp_path / threads / 'points.csv').read_bytes())
     assert tables[0] == tables[1]
