@@ -40,7 +40,7 @@ _FLAT = -1e-3  # curvature of a peak of the steps, from which its top is compute
 _ROUNDS = 3  # of robust least squares
 _OUTLIERS = 5.0  # to a window: residuals that quarter the weight of a ray
 _INLIER, _PIXEL_INLIER = 0.06, 0.4  # of the radius, or px
-_MINIMUM_ASPECT = 0.28
+_MINIMUM_ASPECT = 0.2
 _MINIMUM_MINOR = 1.0  # px
 _PART = 512  # dots fitted at a time, which stay in the cache
 

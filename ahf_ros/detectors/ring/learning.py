@@ -4,6 +4,10 @@ A dot with a concentric band of sectors is a ring target of some family. The bor
 lie on a grid of as many places as the family has bits, but for the growth of ink, which makes all
 arcs longer by as much at either end; the same growth is in the radii of the band and of the dot.
 All targets of a family share bits, radii and rules, so that a few borders of each are enough.
+
+Edges are where half of what is seen is ink. Blur mixes light, and not the gray values that a
+camera makes of it, so that narrow arcs and gaps seem too wide or too narrow in these. Bands are
+found in gray values and measured in both: their edges are closer to circles in what blur mixed.
 """
 
 from __future__ import annotations
@@ -13,6 +17,7 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
 
+import cv2
 import numpy as np
 
 from ahf_ros.blas import one_blas_thread
@@ -35,6 +40,8 @@ from ahf_ros.imaging.image import as_gray, check_image
 MINIMUM_TARGETS = 5
 """Targets of a family from which it is learnt; twenty tell it well."""
 
+_GAMMA = 2.2  # light is this power of gray values as cameras write them
+_INK_CONTRAST = 0.1  # gray value of ink over that of paper, below which there is no such gamma
 _ANGLES = 480
 _RADII = np.arange(1.05, 5.5, 0.05)  # of circles that are read, dot radii
 _CENTRE = np.arange(0.025, 0.4, 0.025)  # of circles about a pinhole, dot radii
@@ -43,10 +50,12 @@ _PINHOLE = 0.025  # radius of a hole that is seen, dot radii
 _REACH, _RAYS = 0.25, 48  # of the edge of a dot: dot radii, and their number
 _DEPTH = 0.25  # share of the band at either edge that says nothing of its sectors
 _NOWHERE = 1e6  # radius of a band that is not there, dot radii
+_CLEARLY = 0.85  # of the deviation of edges in light, where gray values have no gamma
 _EXACT = 0.12  # deviation of the edges of a band from circles, dot radii
 _AGREEING = 0.6  # share of the marks of a band that begin and end there
 _MARKED = 0.03, 0.97  # share of a band that is marked
 _CLEAREST, _FEW = 200, 3  # dots that a free band is measured on, and least number of its bands
+_LEAST = 0.5  # share of ink of a direction, of which an edge of the band is half
 _LOOSE = 0.3  # by which growth of ink moves the bounds of a free band, dot radii
 _STEPS = 50  # of a dot radius, to which radii are measured
 _ALIKE = 0.15  # difference of the radii of bands of one family, dot radii
@@ -55,6 +64,7 @@ _USUAL_GROWTH = 0.8  # its standard deviation, px; an arc that is longer by a se
 _UNUSUAL = 0.5 * (_GROWTH / _USUAL_GROWTH) ** 2 * MINIMUM_TARGETS  # log odds against that
 _ERROR, _MINIMUM_ERROR = 0.3, 0.008  # of the place of a border: px, and rad at least
 _STRAY = 0.05  # share of borders that light makes
+_PROVEN = 10.0  # log odds of a grid against any places, from which there is a family
 _OTHER = 6.0  # log odds of another number of bits, from which a target is of another family
 _UNCLEAR = 0.25  # mean difference of sectors from paper and ink
 _MISREAD = 0.02  # share of words
@@ -96,7 +106,8 @@ class LearntFamily:
     growth: float  # of ink, on all edges, px
     words: np.ndarray  # (k,), canonical words of the targets
     bands: Bands  # the targets
-    lead: float  # log odds of the number of bits against the next one
+    odds: float  # log odds of the grid against any places of borders
+    lead: float  # the same of the number of bits against the next one
     rules: Rules  # the most probable ones of `likely`
     likely: list[tuple[Rules, float]]  # rules that words may follow, and their probabilities
 
@@ -139,17 +150,39 @@ def find_bands(images: Iterable[np.ndarray], settings: DetectorSettings) -> Band
             gray = octave.pyramid.gray
             searches = whole_dots, voted_dots
             kind = *octave.radii, settings.polarities
-            fits = [_fit(gray, search(octave.pyramid, *kind)) for search in searches]
-            bands = _bands(gray, Fit.joined(fits), index)
-            frames = frame.enlarged(bands.frames, octave.level)
-            found.append(replace(bands, frames=frames, size=bands.size * 2**octave.level))
-    return _distinct(Bands.joined(found))
+            dots = [_fit(gray, search(octave.pyramid, *kind)) for search in searches]
+            fit = Fit.joined([of.select(of.share >= ENOUGH) for of in dots])
+            in_gray, in_light = _bands(gray, fit, index)
+            found.append((_enlarged(in_gray, octave.level), _enlarged(in_light, octave.level)))
+    return _distinct(_most_circular(*map(Bands.joined, zip(*found, strict=True))))
 
 
-def _fit(gray: np.ndarray, dots: Dots | Fit) -> Fit:
-    """Return the fits of those dots that have an edge."""
-    fit = fit_dots(gray, dots.frames, dots.polarity, rays=_RAYS, reach=_REACH)
-    return fit.select(fit.share >= ENOUGH)
+def _enlarged(bands: Bands, level: int) -> Bands:
+    """Return bands in the pixels of the image that was halved `level` times."""
+    frames = frame.enlarged(bands.frames, level)
+    return replace(bands, frames=frames, size=bands.size * 2**level)
+
+
+def _most_circular(in_gray: Bands, in_light: Bands) -> Bands:
+    """Return bands as light shows them, or gray values if edges are clearly closer to circles.
+
+    What light does not show has an infinite spread there, and is as gray values show it.
+    """
+    shown = in_light.spread < in_gray.spread / _CLEARLY
+    if 2 * shown.sum() < len(shown):
+        return in_gray
+    seen = np.flatnonzero(np.isfinite(in_light.spread))
+    return in_gray.replaced(seen, in_light.select(seen))
+
+
+def _light(gray: np.ndarray) -> np.ndarray:
+    """Return the light that gray values show, float32, from 0 to 255 as these."""
+    light: np.ndarray = 255 * cv2.pow(np.maximum(gray, 0) / np.float32(255), _GAMMA)
+    return light
+
+
+def _fit(image: np.ndarray, dots: Dots | Fit) -> Fit:
+    return fit_dots(image, dots.frames, dots.polarity, rays=_RAYS, reach=_REACH)
 
 
 def with_measured_bands(
@@ -162,8 +195,9 @@ def with_measured_bands(
     if all(code.bounds is None for code in families):
         return families
     fit = _fit(gray, dots)
+    fit = fit.select(fit.share >= ENOUGH)
     clearest = np.argsort(-fit.share * (1 - fit.contrast), kind='stable')[:_CLEAREST]
-    bands = _bands(gray, fit.select(clearest), 0)
+    bands = _most_circular(*_bands(gray, fit.select(clearest), 0))
     return [
         code if code.bounds is None else _measured(bands, code, *code.bounds) for code in families
     ]
@@ -186,19 +220,26 @@ def _with_band(code: Family, inner: float, outer: float) -> Family:
     return replace(code, band_inner=inner, band_outer=outer, bounds=None)
 
 
-def _bands(gray: np.ndarray, fit: Fit, index: int) -> Bands:
-    """Return the dots of an image that have a band."""
-    values = sample_circles(gray, fit.frames, angles_of(_ANGLES), _RADII)
+def _bands(gray: np.ndarray, fit: Fit, index: int) -> tuple[Bands, Bands]:
+    """Return the dots of an image that have a band, as gray values and as light show them."""
+    in_gray, good = _measured_in(gray, fit, index)
+    in_gray, some = in_gray.select(good), fit.select(good)
+    if not good.any():
+        return in_gray, in_gray
+    light = _light(gray)
+    in_light, good = _measured_in(light, _fit(light, some), index)
+    good &= some.contrast > _INK_CONTRAST
+    spread, holes = np.where(good, in_light.spread, np.inf), _holes(gray, in_gray)
+    return replace(in_gray, pinhole=holes), replace(in_light, pinhole=holes, spread=spread)
+
+
+def _measured_in(image: np.ndarray, fit: Fit, index: int) -> tuple[Bands, np.ndarray]:
+    """Return the bands about dots, but for pinholes, and whether there are any."""
+    values = sample_circles(image, fit.frames, angles_of(_ANGLES), _RADII)
     bright, dark = fit.bright[:, None, None], (fit.contrast * fit.bright)[:, None, None]
     ink = (bright - values) / np.maximum(bright - dark, 1)
     ink = np.where(fit.polarity[:, None, None] > 0, ink, 1 - ink)
-    inked = ink >= 0.5
-    begins = ~inked[..., :-1] & inked[..., 1:]
-    first = begins.argmax(axis=2)
-    ends = inked[..., :-1] & ~inked[..., 1:] & (np.arange(len(_RADII) - 1) > first[..., None])
-    last = ends.argmax(axis=2)
-    marked = begins.any(axis=2) & ends.any(axis=2)
-    edges = [_crossing(ink, at) for at in (first, last)]
+    marked, edges = _edges(ink)
     usual = [median(of, marked, _NOWHERE) for of in edges]
     away = [np.abs(of - middle[:, None]) for of, middle in zip(edges, usual, strict=True)]
     spread = NORMAL * np.maximum(*(median(of, marked, _NOWHERE) for of in away))
@@ -208,12 +249,17 @@ def _bands(gray: np.ndarray, fit: Fit, index: int) -> Bands:
     inside = (depth > _DEPTH) & (depth < 1 - _DEPTH)
     pattern = _mean(np.clip(ink, -0.5, 1.5), np.broadcast_to(inside[:, None], ink.shape))
     dark_part = pattern > 0.5
-    # Blur leaves narrow bands less dark than the dot.
-    low, high = _mean(pattern, ~dark_part), _mean(pattern, dark_part)
-    pattern = (pattern - low[:, None]) / np.maximum(high - low, 0.2)[:, None]
     share = dark_part.mean(axis=1)
     good = (share > _MARKED[0]) & (share < _MARKED[1]) & (spread < _EXACT) & inside.any(axis=1)
     good &= exact.sum(axis=1) > _AGREEING * dark_part.sum(axis=1)
+    # Blur leaves narrow bands less dark than the dot.
+    low, high = median(pattern, ~dark_part, 0.0), median(pattern, dark_part, 1.0)
+    pattern = (pattern - low[:, None]) / np.maximum(high - low, 0.2)[:, None]
+    # It rounds the ends of arcs off, where there is less ink from edge to edge.
+    marked, edges = _edges(ink / np.clip(pattern, _LEAST, 1)[..., None])
+    exact &= marked & dark_part
+    inner, outer = (_mean(of, exact) for of in edges)
+    errors = [of - mean[:, None] for of, mean in zip(edges, (inner, outer), strict=True)]
     found = Bands(
         frames=fit.frames,
         size=fit.size,
@@ -221,11 +267,21 @@ def _bands(gray: np.ndarray, fit: Fit, index: int) -> Bands:
         inner=inner,
         outer=outer,
         ink=pattern,
-        spread=spread,
+        spread=np.sqrt(np.maximum(*(_mean(of**2, exact) for of in errors))),
         pinhole=np.zeros(len(fit.size)),
         image=np.full(len(fit.size), index),
-    ).select(good)
-    return replace(found, pinhole=_holes(gray, found)) if found.size.size else found
+    )
+    return found, good
+
+
+def _edges(ink: np.ndarray) -> tuple[np.ndarray, list[np.ndarray]]:
+    """Return which rays cross a band, bool (k, m), and the radii of its edges on each, (k, m)."""
+    inked = ink >= 0.5
+    begins = ~inked[..., :-1] & inked[..., 1:]
+    first = begins.argmax(axis=2)
+    ends = inked[..., :-1] & ~inked[..., 1:] & (np.arange(len(_RADII) - 1) > first[..., None])
+    marked = begins.any(axis=2) & ends.any(axis=2)
+    return marked, [_crossing(ink, at) for at in (first, ends.argmax(axis=2))]
 
 
 def _holes(gray: np.ndarray, bands: Bands) -> np.ndarray:
@@ -278,7 +334,7 @@ def learn_families(bands: Bands) -> list[LearntFamily]:
         if group.size < MINIMUM_TARGETS:
             break
         members, found = _learn(some.select(group))
-        if len(found.words) >= MINIMUM_TARGETS:
+        if len(found.words) >= MINIMUM_TARGETS and found.odds > _PROVEN:
             learnt.append(found)
         left = np.delete(left, group[members])
     return sorted(learnt, key=lambda it: -len(it.words))
@@ -307,6 +363,7 @@ def _learn(bands: Bands) -> tuple[np.ndarray, LearntFamily]:
         growth=growth,
         words=words[clear],
         bands=some.select(clear),
+        odds=float(total.max()),
         lead=float(total.max() - np.delete(total.max(axis=1), best).max()),
         rules=rules,
         likely=likely,
