@@ -44,15 +44,16 @@ class _Shape(NamedTuple):
 _TINY = _Shape(1.0, 1, 1, 0.6, 1)  # whose edges are the least exact
 _SMALL = _Shape(1.0, 1, 1, 1.4, 1)
 _LARGE = _Shape(1.0, 1, 2, 1.4, 1)
-_OBLIQUE = _Shape(0.5, 6, 2, 1.2, 2)  # finds shapes of 0.3 to 0.7, up to 70 degrees
+_OBLIQUE = _Shape(0.5, 6, 2, 1.2, 2)  # finds shapes of 0.4 to 0.7
+_STEEP = _Shape(0.3, 8, 2, 1.2, 2)  # of 0.25 to 0.4, from 66 to 75 degrees
 _RANGES = {  # by semi-major axes, px
     (3.4, 5.8): (_SMALL,),  # out of focus, as others are found on the level below
-    (5.8, MAXIMUM_RADIUS): (_LARGE, _OBLIQUE),
+    (5.8, MAXIMUM_RADIUS): (_LARGE, _OBLIQUE, _STEEP),
 }
 _FIRST_RANGES = {  # of the first level
     (2.0, 3.4): (_TINY,),
-    (3.4, 5.8): (_SMALL, _OBLIQUE),
-    (5.8, MAXIMUM_RADIUS): (_LARGE, _OBLIQUE),
+    (3.4, 5.8): (_SMALL, _OBLIQUE, _STEEP),
+    (5.8, MAXIMUM_RADIUS): (_LARGE, _OBLIQUE, _STEEP),
 }
 _STEP = 0.8  # of the radii voted for, in cells
 _FLAT_PART = 0.75  # sine of the angle between an edge of an ellipse and its major axis, at most

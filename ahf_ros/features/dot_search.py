@@ -2,7 +2,7 @@
 
 `whole_dots` takes the outlines that an edge follows all the way round: fast, and enough where the
 light is even. `voted_dots` finds the others, whose outlines the edges of light interrupt, in what
-is left of the edges when explained objects are hidden: round ones, those seen at up to 70
+is left of the edges when explained objects are hidden: round ones, those seen at up to 75
 degrees, and those out of focus.
 """
 
