@@ -205,7 +205,7 @@ def _appearance(
     by_levels = np.where(dots.size < _SMALL, ratio, np.minimum(ratio, _PRINTED))
     contrast = np.maximum(dots.contrast, by_levels)
     narrow = (inner - 1) * dots.size < _NARROW * np.maximum(dots.blur, USUAL_BLUR)
-    contrast = np.where(narrow, np.minimum(contrast, bare), contrast)
+    contrast = np.where(narrow, np.minimum(contrast, np.maximum(bare, _PRINTED)), contrast)
     lift = black_lift(contrast, dots.bright)
     dark, bright = (lifted(of, lift) for of in (contrast * dots.bright, dots.bright))
     return np.maximum(dark, _MINIMUM_LEVEL) / np.maximum(bright, _MINIMUM_LEVEL), lift
