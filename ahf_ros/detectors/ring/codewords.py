@@ -10,14 +10,14 @@ from ahf_ros.codes.cyclic import rotated_words
 from ahf_ros.codes.ring import Family, canonical
 
 _EXHAUSTIVE = 50_000  # rotations of words, up to which all of them compete
-_MINIMUM_EVIDENCE = 1.0  # for ones, in units of ln
+_MINIMUM_EVIDENCE = 0.5  # for ones, in units of ln
 
 COMPETITORS = 24
 """Number of words of each band that are returned, more than there are rotations of one."""
 
 _PHASES = 4  # of a band, at which words compete
 _UNCERTAIN = 10  # sectors whose bits are varied where not all words compete
-_UNEXPECTED = 20.0  # evidence against words that are not expected, more than for a cover
+_UNEXPECTED = 25.0  # evidence against words that are not expected, more than for a cover
 
 
 def best_words(
@@ -54,9 +54,7 @@ def best_words(
         competing, shown = (
             _all_rotations(family)
             if everything
-            else _near_rotations(
-                _beside(bits[one], of_ones[one], of_pairs[one]), family, expected
-            )
+            else _near_rotations(_beside(bits[one], of_ones[one], of_pairs[one]), family, expected)
         )
         scores = of_phases[some] @ shown
         of_word = np.round(scores.max(axis=1), 2)  # last bits differ between processors

@@ -196,7 +196,7 @@ def _doubted(evidence: Evidence) -> Evidence:
 
 
 def _unsure(every: np.ndarray, evidence: Evidence) -> np.ndarray:
-    """Return the evidence for shares between, from that for all, (k, s, m), which is the best near.
+    """Return the evidence for shares between, from that for all, (k, s, m): the best one near.
 
     The phase of sectors is known to about half an angle, which is some share where arcs end.
     """

@@ -65,7 +65,7 @@ class Evidence(ArrayRecord):
     paper, ink : ndarray of float32, shape (k, 2, m)
         Where the band is unmarked, and where it is marked.
     between : ndarray of float32, shape (k, 2, s, m)
-        Where blur mixes both, for shares of ink that are equal steps from paper to ink; s may be 0.
+        Where blur mixes both, for shares of ink in equal steps from paper to ink; s may be 0.
     weight : ndarray of float32, shape (k,)
         Of a reading, which is part of both; less than 1 where neighbours tell the same.
     dot : ndarray of float32, shape (k,)
