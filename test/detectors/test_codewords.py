@@ -6,7 +6,13 @@ import numpy as np
 import pytest
 
 from ahf_ros.codes.ring import canonical, family, sectors
-from ahf_ros.detectors.ring.codewords import COMPETITORS, best_words, margins, prior
+from ahf_ros.detectors.ring.codewords import (
+    COMPETITORS,
+    best_words,
+    likeliest_bits,
+    margins,
+    prior,
+)
 
 PHASES = 4
 
@@ -57,3 +63,12 @@ def test_an_expected_word_competes_however_little_speaks_for_it(name: str) -> No
     before = prior(np.array([shown, expected]), code, frozenset({5}))
     assert before[1] == 0 > before[0]
     assert not prior(np.array([shown, expected]), code, frozenset()).any()
+
+
+def test_the_likeliest_bits_are_those_of_all_that_have_most_evidence() -> None:
+    ones, pairs = np.random.default_rng(6).normal(size=(2, 40, 7))
+    every = np.arange(1 << 7)[:, None] >> np.arange(7) & 1
+    scores = ones @ every.T + pairs @ (every & np.roll(every, 1, axis=1)).T
+    bits, highest = likeliest_bits(ones, pairs)
+    assert np.allclose(highest, scores.max(axis=1))
+    assert np.array_equal(bits, every[scores.argmax(axis=1)])
