@@ -448,7 +448,8 @@ def _free_paths(evidence: Evidence) -> tuple[np.ndarray, np.ndarray]:
     white, dark = paper[0], ink[0]
     covered = np.full_like(white, _NEVER)
     of_white, of_dark, of_covered = np.zeros((3, len(white)), np.intp)
-    mixed = np.maximum(np.maximum(paper, ink), 0) - border
+    between = evidence.between.max(axis=1, initial=0).T
+    mixed = np.maximum(np.maximum(paper, ink), between) - border
     for of_paper, of_ink, of_border in zip(paper[1:], ink[1:], mixed[1:], strict=True):
         begun, of_begun = _better(white, of_white, dark, of_dark)
         to_white, to_dark = (dark + of_border, of_dark + 1), (white + of_border, of_white + 1)
