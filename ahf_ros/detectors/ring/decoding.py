@@ -28,6 +28,7 @@ _DRAW = 5.0  # lead of a word that is not expected, which is as good as none
 _NEAR = 3  # angles on either side of the clearest one
 _REFINED = 2  # best words, that compete at the phases beside theirs as well
 _PHASE = 0.5  # error of the phase of sectors, angles
+_END = 2.3  # length of an end of an arc, from an eighth of ink to seven, in deviations of its blur
 _NEVER = np.float32(-np.inf)
 
 CLEAR = 15.0
@@ -126,7 +127,6 @@ def decode(
     words, phases = _at_near_phases(words[read], phases[read])
     some = of_bands.select(read)
     ends = spread_ends(overhang[read], some.blur, per_sector)
-    steps = _steps(words, phases, ends, some, family)
     order = _clearest(some)
     turned = replace(
         some,
@@ -134,15 +134,21 @@ def decode(
         ink=np.take_along_axis(some.ink, order, 1),
         between=np.take_along_axis(some.between, order[:, None], 2),
     )
-    shown = np.take_along_axis(steps, order[:, None], axis=2)
-    evidence_of = _along_words(turned, shown)
-    last = some.between.shape[1] + 1
-    along = (2 * shown > last).transpose(2, 0, 1)
     like_paper = np.take_along_axis(
         np.maximum(some.paper, _half_paper(evidence.select(read))), order, axis=1
     )
-    as_paper = np.where(along, like_paper.T[..., None], turned.paper.T[..., None])
-    scores = _covered_paths(evidence_of, as_paper, turned)
+    last = some.between.shape[1] + 1
+
+    def explained(words: np.ndarray, phases: np.ndarray) -> tuple[np.ndarray, ...]:
+        """Return what words show, the evidence for them along bands, with covers, and in all."""
+        steps = _steps(words, phases, ends, some, family)
+        shown = np.take_along_axis(steps, order[:, None], axis=2)
+        seen = _along_words(turned, shown)
+        marked = (2 * shown > last).transpose(2, 0, 1)
+        as_paper = np.where(marked, like_paper.T[..., None], turned.paper.T[..., None])
+        return steps, seen, as_paper, _covered_paths(seen, as_paper, turned)
+
+    steps, evidence_of, as_paper, scores = explained(words, phases)
     likely = scores + prior(words, family, expected)
     rows, best = np.arange(len(read)), likely.argmax(axis=1)
     # What is expected wins a draw, but an ID that is read clearly is no other one.
@@ -161,8 +167,7 @@ def decode(
     turn = phases[rows, best] // per_sector
     looks = np.take_along_axis(looks, (turn[:, None] + np.arange(family.bits)) % family.bits, 1)
     other = looks @ (1 << np.arange(family.bits))
-    of_other = _steps(other[:, None], phases[rows, best][:, None], ends, some, family)
-    of_other = _along_words(some, of_other).sum(axis=0)[:, 0].astype(np.float64)
+    *_, of_other = explained(other[:, None], phases[rows, best][:, None])
     arcs, of_arcs = _free_paths(turned)
     of_best = steps[rows, best]
     of_best_word = 2 * of_best > last, (of_best > 0) & (of_best < last)
@@ -174,7 +179,7 @@ def decode(
         coded=score - arcs - _of_borders(*of_best_word, hidden, of_arcs, _border(turned), family),
         ends=np.zeros(len(read)),
         other=other,
-        ahead=of_other - score,
+        ahead=of_other[:, 0] - score,
         seen=score,
         unlike=np.zeros(len(read)),
         hidden=hidden,
@@ -449,16 +454,28 @@ def _free_paths(evidence: Evidence) -> tuple[np.ndarray, np.ndarray]:
     covered = np.full_like(white, _NEVER)
     of_white, of_dark, of_covered = np.zeros((3, len(white)), np.intp)
     between = evidence.between.max(axis=1, initial=0).T
-    mixed = np.maximum(np.maximum(paper, ink), between) - border
-    for of_paper, of_ink, of_border in zip(paper[1:], ink[1:], mixed[1:], strict=True):
+    mixed = np.cumsum(np.maximum(np.maximum(paper, ink), between), axis=0)
+    # An end of an arc is as long as blur makes it.
+    length = np.maximum(np.rint(_END * np.hypot(evidence.blur, _PHASE)), 1).astype(int)
+    bands = np.arange(len(white))
+    paths = np.empty((4, *paper.shape), paper.dtype)  # white, dark, and their borders
+    paths[:, 0] = white, dark, of_white, of_dark
+    for angle in range(1, len(paper)):
+        first = np.maximum(angle - length, 0)
+        from_white, from_dark, white_borders, dark_borders = paths[:, first, bands]
+        end = mixed[angle] - mixed[first, bands] - border
         begun, of_begun = _better(white, of_white, dark, of_dark)
-        to_white, to_dark = (dark + of_border, of_dark + 1), (white + of_border, of_white + 1)
         white, of_white = _better(white, of_white, covered, of_covered)
         dark, of_dark = _better(dark, of_dark, covered, of_covered)
-        white, of_white = _better(white + of_paper, of_white, *to_white)
-        dark, of_dark = _better(dark + of_ink, of_dark, *to_dark)
+        to_white, to_dark = (
+            (from_dark + end, dark_borders + 1),
+            (from_white + end, white_borders + 1),
+        )
+        white, of_white = _better(white + paper[angle], of_white, *to_white)
+        dark, of_dark = _better(dark + ink[angle], of_dark, *to_dark)
         covered, of_covered = _better(covered, of_covered, begun - cover, of_begun)
         covered = covered - cost
+        paths[:, angle] = white, dark, of_white, of_dark
     return _better(*_better(white, of_white, dark, of_dark), covered, of_covered)
 
 
