@@ -6,7 +6,13 @@ import numpy as np
 import pytest
 
 from ahf_ros.codes.ring import canonical, family, sectors
-from ahf_ros.detectors.ring.codewords import COMPETITORS, best_words, margins, prior
+from ahf_ros.detectors.ring.codewords import (
+    COMPETITORS,
+    best_words,
+    likeliest_bits,
+    margins,
+    prior,
+)
 
 PHASES = 4
 
@@ -20,7 +26,7 @@ def evidence(word: int, bits: int, phase: int, strength: float = 8.0) -> np.ndar
 
 def test_a_band_without_ones_is_not_read_nor_is_none() -> None:
     for says in (evidence(0, 12, 0), np.zeros((0, 10, 12))):
-        words, phases = best_words(says, family('metashape12'))
+        words, phases = best_words(says, 0 * says, family('metashape12'))
         assert words.shape == phases.shape == (len(says), COMPETITORS)
         assert not words.any()
         assert not phases.any()
@@ -29,7 +35,8 @@ def test_a_band_without_ones_is_not_read_nor_is_none() -> None:
 def test_an_invalid_word_gives_the_nearest_valid_ones() -> None:
     code = family('metashape12')
     odd = int(code.words[20]) ^ 1 << 11
-    words, phases = best_words(evidence(odd, 12, 1), code)
+    says = evidence(odd, 12, 1)
+    words, phases = best_words(says, 0 * says, code)
     there = phases[0] == 1
     differ = np.array([int(word ^ odd).bit_count() for word in words[0, there].tolist()])
     assert differ[:2].tolist() == [1, 1]
@@ -50,9 +57,18 @@ def test_an_expected_word_competes_however_little_speaks_for_it(name: str) -> No
     code = family(name)
     shown, expected = code.word(100), code.word(5)
     says = evidence(shown, code.bits, 0)
-    assert expected not in canonical(best_words(says, code)[0][0], code)[0]
-    words, _ = best_words(says, code, frozenset({5}))
+    assert expected not in canonical(best_words(says, 0 * says, code)[0][0], code)[0]
+    words, _ = best_words(says, 0 * says, code, frozenset({5}))
     assert expected in canonical(words[0], code)[0]
     before = prior(np.array([shown, expected]), code, frozenset({5}))
     assert before[1] == 0 > before[0]
     assert not prior(np.array([shown, expected]), code, frozenset()).any()
+
+
+def test_the_likeliest_bits_are_those_of_all_that_have_most_evidence() -> None:
+    ones, pairs = np.random.default_rng(6).normal(size=(2, 40, 7))
+    every = np.arange(1 << 7)[:, None] >> np.arange(7) & 1
+    scores = ones @ every.T + pairs @ (every & np.roll(every, 1, axis=1)).T
+    bits, highest = likeliest_bits(ones, pairs)
+    assert np.allclose(highest, scores.max(axis=1))
+    assert np.array_equal(bits, every[scores.argmax(axis=1)])

@@ -24,11 +24,12 @@ def seen(marked: np.ndarray, weight: float = 1.0) -> Evidence:
     return Evidence(
         paper=np.where(halves, absent, there),
         ink=np.where(halves, there, absent),
+        between=np.zeros((count, 2, 0, marked.shape[1]), np.float32),
         weight=np.full(count, weight, np.float32),
         dot=np.zeros(count, np.float32),
         lit=np.full(count, SURPRISES[0], np.float32),
         covered=np.zeros(halves.shape, bool),
-        mixed=np.full((count, 2), 0.3, np.float32),
+        blur=np.full(count, 0.2),
     )
 
 

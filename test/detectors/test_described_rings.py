@@ -97,3 +97,22 @@ def test_sectors_that_blur_mixes_are_read(tmp_path: Path, light: str, least: int
     found = score(scene, create_detector(family='mine', family_file=str(file))(scene.image))
     assert found.right >= least
     assert found.wrong == found.false_positives == 0
+
+
+@pytest.mark.parametrize(
+    ('bits', 'band', 'radius'),
+    [(22, (1.8, 2.7), 6.2), (24, (1.41, 2.0), 7.8)],
+)
+def test_bright_sectors_and_gaps_little_wider_than_blur_are_read(
+    tmp_path: Path, bits: int, band: tuple[float, float], radius: float
+) -> None:
+    generator = np.random.default_rng(5)
+    words = generator.integers(1, (1 << bits) - 1, 40)
+    words = np.unique(smallest_rotation(words, bits)).tolist()
+    file = tmp_path / 'mine.yaml'
+    file.write_text(f'family: mine\nbits: {bits}\nband: {list(band)}\nwords: {words}\n')
+    changes = {'dot_radius': radius, 'edge_shift': -0.5, 'polarity': 'bright'}
+    scene = shown(str(file), **changes)
+    found = score(scene, create_detector(family='mine', family_file=str(file))(scene.image))
+    assert found.right >= 11
+    assert found.wrong == found.false_positives == 0

@@ -11,7 +11,9 @@ from ahf_ros.codes.ring import family
 from ahf_ros.detectors import DetectorSettings
 from ahf_ros.detectors.ring import proposals
 from ahf_ros.detectors.ring.detector import find_hypotheses, report
-from ahf_ros.detectors.ring.proposals import may_be_targets
+from ahf_ros.detectors.ring.proposals import may_be_targets, with_rims
+from ahf_ros.features import frame
+from ahf_ros.features.dots import Dots
 from ahf_ros.synthetic.scene import SceneSettings, render
 from support.ring import lone_dot, measured
 
@@ -67,3 +69,12 @@ def test_a_glance_saves_time_and_changes_nothing(
     assert [it.key for it in targets] == [it.key for it in expected]
     for one, other in zip(targets, expected, strict=True):
         assert (one.x, one.y) == pytest.approx((other.x, other.y), abs=0.02)
+
+
+def test_rims_of_bands_about_narrow_gaps_propose_their_middles() -> None:
+    size = np.array([9.0, 11.0, 40.0])
+    found = Dots(frame.affine_frames(size, size, size, size, 0 * size), np.ones(3, int), size)
+    narrow = replace(FAMILIES[0], band_inner=1.5, band_outer=2.0)
+    dots = with_rims(found, [*FAMILIES, narrow], 5.0)
+    assert frame.mean_radii(dots.frames).tolist() == pytest.approx([9, 11, 40, 5.5])
+    assert dots.frames[3, :2, 2].tolist() == [11, 11]

@@ -10,23 +10,27 @@ from ahf_ros.codes.cyclic import rotated_words
 from ahf_ros.codes.ring import Family, canonical
 
 _EXHAUSTIVE = 50_000  # rotations of words, up to which all of them compete
-_MINIMUM_EVIDENCE = 1.0  # for ones, in units of ln
+_MINIMUM_EVIDENCE = 0.5  # for ones, in units of ln
 
 COMPETITORS = 24
 """Number of words of each band that are returned, more than there are rotations of one."""
 
 _PHASES = 4  # of a band, at which words compete
 _UNCERTAIN = 10  # sectors whose bits are varied where not all words compete
-_UNEXPECTED = 20.0  # evidence against words that are not expected, more than for a cover
+_UNEXPECTED = 25.0  # evidence against words that are not expected, more than for a cover
 
 
 def best_words(
-    sectors: np.ndarray, family: Family, expected: frozenset[int] = frozenset()
+    ones: np.ndarray,
+    pairs: np.ndarray,
+    family: Family,
+    expected: frozenset[int] = frozenset(),
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the valid words with the most evidence, and the best phase of each.
 
     Both have the shape (k, COMPETITORS), the best first, words in the rotation read and 0 where
-    there is none. `sectors`, shape (k, p, n), is the evidence for one over zero in each of n bits.
+    there is none. `ones`, shape (k, p, n), is the evidence for a one over a zero in each of n
+    bits, and `pairs` what one after another one adds, because arcs spread beyond their sectors.
 
     Bands without evidence for any mark are not read. In the others every rotation of every word
     competes at the likeliest of p phases, which are ways to divide the band into sectors. In
@@ -35,20 +39,24 @@ def best_words(
     """
     everything = len(family.words) * family.bits <= _EXHAUSTIVE
     count = COMPETITORS * (2 if expected else 1)
-    words, phases = np.zeros((2, len(sectors), count), np.int64)
-    hopeful = np.flatnonzero(np.maximum(sectors, 0).sum(axis=2).max(axis=1) > _MINIMUM_EVIDENCE)
-    # Where sectors begin, each says most for one or zero; any other phase mixes neighbours.
-    likely = np.argsort(-np.abs(sectors).sum(axis=2), axis=1, kind='stable')[:, :_PHASES]
-    of_phases = np.take_along_axis(sectors, likely[..., None], axis=1).astype(np.float32)
+    words, phases = np.zeros((2, len(ones), count), np.int64)
+    bits, highest = likeliest_bits(ones, pairs)
+    hopeful = np.flatnonzero(highest.max(axis=1, initial=0) > _MINIMUM_EVIDENCE)
+    likely = np.argsort(-highest, axis=1, kind='stable')[:, :_PHASES]
+    of_ones, of_pairs, bits = (
+        np.take_along_axis(of, likely[..., None], axis=1) for of in (ones, pairs, bits)
+    )
+    of_phases = np.concatenate([of_ones, of_pairs], axis=2).astype(np.float32)
     at_once = max(1, 2 * _EXHAUSTIVE // (len(family.words) * family.bits)) if everything else 1
     for start in range(0, len(hopeful), at_once):
         some = hopeful[start : start + at_once]
-        competing, ones = (
+        one = some[0]
+        competing, shown = (
             _all_rotations(family)
             if everything
-            else _near_rotations(of_phases[some[0]], family, expected)
+            else _near_rotations(_beside(bits[one], of_ones[one], of_pairs[one]), family, expected)
         )
-        scores = of_phases[some] @ ones
+        scores = of_phases[some] @ shown
         of_word = np.round(scores.max(axis=1), 2)  # last bits differ between processors
         best = _best(of_word, COMPETITORS)
         if expected:
@@ -58,6 +66,41 @@ def best_words(
         phase = np.take_along_axis(scores, best[:, None], axis=2).argmax(axis=1)
         phases[some] = np.take_along_axis(likely[some], phase, axis=1)
     return words, phases
+
+
+def likeliest_bits(ones: np.ndarray, pairs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the bits, valid or not, with the most evidence, and that, (..., n) bool and (...,).
+
+    The evidence is that of `best_words`. By dynamic programming, once for each first bit.
+    """
+    count = ones.shape[-1]
+    # The first axis is the first bit, the second one the last bit so far.
+    scores = np.full((2, 2, *ones.shape[:-1]), -np.inf)
+    scores[0, 0], scores[1, 1] = 0.0, ones[..., 0]
+    before = np.zeros((count, *scores.shape), bool)
+    for bit in range(1, count):
+        zero, one = scores[:, 0], scores[:, 1]
+        joined = one + pairs[..., bit]
+        before[bit, :, 0], before[bit, :, 1] = one > zero, joined > zero
+        scores = np.stack(
+            [np.maximum(zero, one), np.maximum(zero, joined) + ones[..., bit]], axis=1
+        )
+    scores[1, 1] += pairs[..., 0]
+    ends = scores.reshape(4, *ones.shape[:-1])
+    best, highest = ends.argmax(axis=0), ends.max(axis=0)
+    first, last = best >> 1, best & 1
+    bits = np.zeros(ones.shape, bool)
+    flat = before.reshape(count, 4, *ones.shape[:-1])
+    for bit in range(count - 1, -1, -1):
+        bits[..., bit] = last
+        last = np.take_along_axis(flat[bit], (2 * first + last)[None], axis=0)[0].astype(int)
+    return bits, highest
+
+
+def _beside(bits: np.ndarray, ones: np.ndarray, pairs: np.ndarray) -> np.ndarray:
+    """Return the evidence for ones over zeros beside other bits as they are, all (..., n)."""
+    joined: np.ndarray = pairs * np.roll(bits, 1, axis=-1)
+    return ones + joined + np.roll(pairs, -1, axis=-1) * np.roll(bits, -1, axis=-1)
 
 
 def _best(scores: np.ndarray, count: int) -> np.ndarray:
@@ -92,14 +135,14 @@ def margins(words: np.ndarray, scores: np.ndarray, best: np.ndarray, family: Fam
 
 @cache
 def _all_rotations(family: Family) -> tuple[np.ndarray, np.ndarray]:
-    """Return all rotations of all words, and their bits."""
-    return _with_ones(_rotated(family.words, family), family.bits)
+    """Return all rotations of all words, and what they show."""
+    return _with_bits(_rotated(family.words, family), family.bits)
 
 
 def _near_rotations(
     sectors: np.ndarray, family: Family, expected: frozenset[int]
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the words near to what the sectors say at any of the phases, and their bits.
+    """Return the words near to what the sectors say at any of the phases, and what they show.
 
     Those that are expected compete as well.
     """
@@ -110,7 +153,7 @@ def _near_rotations(
     valid = words[family.ids(words) > 0]
     # At least two words have to compete.
     words = np.concatenate([valid, family.words[:2], _expected_rotations(family, expected)])
-    return _with_ones(np.unique(words), family.bits)
+    return _with_bits(np.unique(words), family.bits)
 
 
 @lru_cache(maxsize=8)
@@ -125,6 +168,7 @@ def _rotated(words: np.ndarray, family: Family) -> np.ndarray:
     return np.unique(turns)
 
 
-def _with_ones(words: np.ndarray, bits: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return words and their bits, float32, shape (bits, number of words)."""
-    return words, (words >> np.arange(bits)[:, None] & 1).astype(np.float32)
+def _with_bits(words: np.ndarray, bits: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return words and their ones and pairs, float32, shape (2 bits, number of words)."""
+    ones = words >> np.arange(bits)[:, None] & 1
+    return words, np.concatenate([ones, ones & np.roll(ones, 1, axis=0)]).astype(np.float32)

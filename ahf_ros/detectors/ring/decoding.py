@@ -13,8 +13,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ahf_ros.codes.ring import Family
-from ahf_ros.detectors.ring.codewords import best_words, margins, prior
-from ahf_ros.detectors.ring.likelihood import SURPRISES, Evidence
+from ahf_ros.detectors.ring.codewords import best_words, likeliest_bits, margins, prior
+from ahf_ros.detectors.ring.likelihood import SURPRISES, Evidence, normal_integral
 from ahf_ros.features.array_record import ArrayRecord
 
 _COVER = 6.0  # price of something that covers a stretch of the band
@@ -27,7 +27,8 @@ _RANKED = 1.2  # evidence of a reading that ranks words, which one cover must no
 _DRAW = 5.0  # lead of a word that is not expected, which is as good as none
 _NEAR = 3  # angles on either side of the clearest one
 _REFINED = 2  # best words, that compete at the phases beside theirs as well
-_PHASE = 0.6  # error of the phase of sectors, and more, angles
+_PHASE = 0.5  # error of the phase of sectors, angles
+_END = 2.3  # length of an end of an arc, from an eighth of ink to seven, in deviations of its blur
 _NEVER = np.float32(-np.inf)
 
 CLEAR = 15.0
@@ -117,47 +118,59 @@ def decode(
     per_sector = angles // family.bits
     cap = _RANKED * of_bands.weight[:, None]
     ranked = np.clip(of_bands.ink - of_bands.paper, -cap, cap)
-    sectors = ranked[:, sectors_by_phase(per_sector, family)]
-    sectors = (sectors * _middles(overhang, per_sector)[:, None, None]).sum(axis=3)
-    words, phases = best_words(sectors, family, expected)
+    ones, pairs = _of_sectors(ranked, overhang, evidence.blur, family)
+    words, phases = best_words(ones, pairs, family, expected)
     read = np.flatnonzero(words[:, 0] > 0)
     decoded = Words.none(count, angles)
     if not read.size:
         return decoded
     words, phases = _at_near_phases(words[read], phases[read])
     some = of_bands.select(read)
-    printed = bits_at(words, phases, per_sector, family)
-    bits, mixed = lengthened(printed, overhang[read]), _mixed(printed, overhang[read], some.mixed)
+    ends = spread_ends(overhang[read], some.blur, per_sector)
     order = _clearest(some)
     turned = replace(
         some,
         paper=np.take_along_axis(some.paper, order, 1),
         ink=np.take_along_axis(some.ink, order, 1),
+        between=np.take_along_axis(some.between, order[:, None], 2),
     )
-    along, on_ends = (
-        np.take_along_axis(of, order[:, None], axis=2).transpose(2, 0, 1) for of in (bits, mixed)
-    )
-    evidence_of = _along_words(turned, along, on_ends)
     like_paper = np.take_along_axis(
         np.maximum(some.paper, _half_paper(evidence.select(read))), order, axis=1
     )
-    as_paper = np.where(along, like_paper.T[..., None], turned.paper.T[..., None])
-    scores = _covered_paths(evidence_of, as_paper, turned)
+    last = some.between.shape[1] + 1
+
+    def explained(words: np.ndarray, phases: np.ndarray) -> tuple[np.ndarray, ...]:
+        """Return what words show, the evidence for them along bands, with covers, and in all."""
+        steps = _steps(words, phases, ends, some, family)
+        shown = np.take_along_axis(steps, order[:, None], axis=2)
+        seen = _along_words(turned, shown)
+        marked = (2 * shown > last).transpose(2, 0, 1)
+        as_paper = np.where(marked, like_paper.T[..., None], turned.paper.T[..., None])
+        return steps, seen, as_paper, _covered_paths(seen, as_paper, turned)
+
+    steps, evidence_of, as_paper, scores = explained(words, phases)
     likely = scores + prior(words, family, expected)
     rows, best = np.arange(len(read)), likely.argmax(axis=1)
     # What is expected wins a draw, but an ID that is read clearly is no other one.
     read_as, known_as = (margins(words, of, best, family) for of in (scores, likely))
     margin = np.clip(known_as, read_as, read_as + _DRAW)
-    of_best = evidence_of[:, rows, best], as_paper[:, rows, best]
-    turned_hidden = _hidden(*of_best, scores[rows, best], turned)
+    of_word = evidence_of[:, rows, best], as_paper[:, rows, best]
+    turned_hidden = _hidden(*of_word, scores[rows, best], turned)
     hidden = np.empty(turned_hidden.shape, bool)
     np.put_along_axis(hidden, order, turned_hidden, axis=1)
     hidden |= (some.paper == 0) & (some.ink == 0)
     score = scores[rows, best].astype(np.float64)
     bare = np.maximum(turned.paper.sum(axis=1), 0)
-    other, of_other = _sectors_as_they_look(some, phases[rows, best], per_sector)
+    at_phase = phases[rows, best] % per_sector
+    looks, _ = likeliest_bits(ones[read, at_phase], pairs[read, at_phase])
+    # The phases of words begin at any of the sectors.
+    turn = phases[rows, best] // per_sector
+    looks = np.take_along_axis(looks, (turn[:, None] + np.arange(family.bits)) % family.bits, 1)
+    other = looks @ (1 << np.arange(family.bits))
+    *_, of_other = explained(other[:, None], phases[rows, best][:, None])
     arcs, of_arcs = _free_paths(turned)
-    of_best_word = bits[rows, best], mixed[rows, best]
+    of_best = steps[rows, best]
+    of_best_word = 2 * of_best > last, (of_best > 0) & (of_best < last)
     found = Words(
         words=words[rows, best],
         starts=2 * np.pi * phases[rows, best] / angles,
@@ -166,7 +179,7 @@ def decode(
         coded=score - arcs - _of_borders(*of_best_word, hidden, of_arcs, _border(turned), family),
         ends=np.zeros(len(read)),
         other=other,
-        ahead=of_other - score,
+        ahead=of_other[:, 0] - score,
         seen=score,
         unlike=np.zeros(len(read)),
         hidden=hidden,
@@ -179,12 +192,32 @@ def _doubted(evidence: Evidence) -> Evidence:
 
     Light may do anything at any angle.
     """
-    paper, ink = (_bounded(of.sum(axis=1), evidence) for of in (evidence.paper, evidence.ink))
-    return replace(evidence, paper=paper, ink=ink)
+    paper, ink, between = (
+        _bounded(of.sum(axis=1), evidence)
+        for of in (evidence.paper, evidence.ink, evidence.between)
+    )
+    between = _unsure(np.concatenate([paper[:, None], between, ink[:, None]], axis=1), evidence)
+    return replace(evidence, paper=paper, ink=ink, between=between)
+
+
+def _unsure(every: np.ndarray, evidence: Evidence) -> np.ndarray:
+    """Return the evidence for shares between, from that for all, (k, s, m): the best one near.
+
+    The phase of sectors is known to about half an angle, which is some share where arcs end.
+    """
+    steps = every.shape[1] - 1
+    error = _PHASE / np.sqrt(2 * np.pi) / np.hypot(evidence.blur, _PHASE)
+    reach = np.rint(error * steps)[:, None, None]
+    between = every[:, 1:-1]
+    for away in range(1, steps):
+        for low in (1 - away, 1 + away):
+            which = np.clip(np.arange(low, low + steps - 1), 0, steps)
+            between = np.where(reach >= away, np.maximum(between, every[:, which]), between)
+    return between
 
 
 def _bounded(values: np.ndarray, of: Evidence) -> np.ndarray:
-    most = np.float32(_MAXIMUM_READING) * of.weight[:, None]
+    most = np.float32(_MAXIMUM_READING) * of.weight.reshape(-1, *(1,) * (values.ndim - 1))
     return most * np.tanh(values / most)
 
 
@@ -208,18 +241,42 @@ def _like_paper(of: Evidence) -> tuple[np.ndarray, np.ndarray]:
     return np.float32(_LIKE_PAPER) * light, np.float32(_MORE) * of.weight * light
 
 
-def sectors_by_phase(per_sector: int, family: Family) -> np.ndarray:
-    """Return the indices of the angles of every sector at each phase, (p, bits, p), int."""
-    count = family.bits * per_sector
+def _of_sectors(
+    ranked: np.ndarray, overhang: np.ndarray, blur: np.ndarray, family: Family
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the evidence for ones over zeros, and for pairs, as `best_words` takes it.
+
+    From the evidence for ink over paper at each angle, (k, m). Arcs spread beyond their sectors by
+    `overhang` and `blur`, angles of shape (k,), and fill the sectors between.
+    """
+    count = ranked.shape[1]
+    per_sector = count // family.bits
+    sums = np.zeros_like(ranked)
+    begins, ends = np.zeros((2, *ranked.shape))
+    rising, falling = spread_ends(overhang, blur, per_sector)
+    for step, (rise, fall) in enumerate(zip(rising.T, falling.T, strict=True), -per_sector):
+        ahead = np.roll(ranked, -step, axis=1)
+        if step >= 0:
+            sums += ahead
+        begins += rise[:, None] * ahead
+        ends += fall[:, None] * ahead
+    ones, pairs = sums + begins + np.roll(ends, -per_sector, axis=1), -(begins + ends)
     first = np.arange(per_sector)[:, None] + np.arange(0, count, per_sector)
-    return (first[..., None] + np.arange(per_sector)) % count
+    return ones[:, first], pairs[:, first]
 
 
-def _middles(overhang: np.ndarray, per_sector: int) -> np.ndarray:
-    """Return which angles of sectors no neighbour's overhang reaches, (k, per_sector)."""
-    away = np.abs(np.arange(per_sector) - (per_sector - 1) / 2)
-    reach = np.maximum(per_sector / 2 - np.rint(np.abs(overhang)), 1)
-    return away < reach[:, None]
+def spread_ends(
+    overhang: np.ndarray, blur: np.ndarray, reach: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the shares of ink that spread arcs have about their ends, more than those printed.
+
+    At `reach` angles on either side of where arcs begin, and of where they end, (k, 2 reach).
+    """
+    away = np.arange(-reach, reach) + 0.5
+    over, wide = overhang[:, None], np.hypot(blur, _PHASE)[:, None]
+    rising = normal_integral((away + over) / wide) - (away > 0)
+    falling = (away > 0) - normal_integral((away - over) / wide)
+    return rising, falling
 
 
 def bits_at(words: np.ndarray, phases: np.ndarray, per_sector: int, family: Family) -> np.ndarray:
@@ -252,43 +309,40 @@ def _at_near_phases(words: np.ndarray, phases: np.ndarray) -> tuple[np.ndarray, 
     return np.hstack([words, best, best]), np.hstack([phases, phase - 1, phase + 1])
 
 
-def _mixed(bits: np.ndarray, overhang: np.ndarray, blurred: np.ndarray) -> np.ndarray:
-    """Return at which angles bits (k, ..., m) as printed may show paper and ink, of their shape.
+def _steps(
+    words: np.ndarray,
+    phases: np.ndarray,
+    ends: tuple[np.ndarray, np.ndarray],
+    of: Evidence,
+    family: Family,
+) -> np.ndarray:
+    """Return the shares of ink that words show at each angle, in steps of `Evidence.between`.
 
-    There arcs of ink end that are longer by angles, shape (k,), of a phase that is known to about
-    half an angle; `blurred` is `Evidence.mixed`.
+    Of words (k, w) by their phases, from the spread of ends of arcs, see `spread_ends`; uint8,
+    shape (k, w, m).
     """
-    beyond, within = blurred.T + _PHASE
-    possible, sure = lengthened(bits, overhang + beyond), lengthened(bits, overhang - within)
-    return possible & ~sure
+    bits = (words[..., None] >> np.arange(family.bits) & 1).astype(np.float32)
+    before = np.roll(bits, 1, axis=2)
+    begins, finishes = bits * (1 - before), before * (1 - bits)
+    here = [bits, begins, finishes, np.roll(begins, -1, axis=2), np.roll(finishes, -1, axis=2)]
+    per_sector = ends[0].shape[1] // 2
+    (early_rise, rise), (early_fall, fall) = (np.split(end, 2, axis=1) for end in ends)
+    spread = np.stack([np.ones_like(rise), rise, fall, early_rise, early_fall], axis=1)
+    of_sectors = np.stack(here, axis=-1).reshape(len(words), -1, len(here))
+    shares = np.clip(of_sectors @ spread.astype(np.float32), 0, 1)
+    steps = np.rint(shares * np.float32(of.between.shape[1] + 1)).astype(np.uint8)
+    count = family.bits * per_sector
+    at = (np.arange(count, dtype=np.int32) - phases[..., None].astype(np.int32)) % count
+    return np.take_along_axis(steps.reshape(*words.shape, count), at, axis=2)
 
 
-def _along_words(evidence: Evidence, along: np.ndarray, mixed: np.ndarray) -> np.ndarray:
-    """Return the evidence for words at each angle, bits and result of shape (m, k, w).
-
-    Readings at ends of arcs, which are of both, may be of either, or of neither.
-    """
-    paper, ink = evidence.paper.T[..., None], evidence.ink.T[..., None]
-    return np.where(mixed, np.maximum(np.maximum(paper, ink), 0), np.where(along, ink, paper))
-
-
-def _sectors_as_they_look(
-    evidence: Evidence, phases: np.ndarray, per_sector: int
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return the sectors from a phase on as each looks best, and the evidence for them, (k,) each.
-
-    Angles next to a border may lie to either side of it, as they may along words.
-    """
-    count = evidence.paper.shape[1]
-    order = (phases[:, None] + np.arange(count)) % count
-    paper, ink = (
-        np.take_along_axis(of, order, axis=1).reshape(len(of), -1, per_sector)
-        for of in (evidence.paper, evidence.ink)
-    )
-    either = np.maximum(np.maximum(paper, ink), 0)[..., [0, -1]].sum(axis=(1, 2))
-    of_paper, of_ink = (of[..., 1:-1].sum(axis=2) for of in (paper, ink))
-    words = (of_ink > of_paper) @ (1 << np.arange(paper.shape[1]))
-    return words, (np.maximum(of_paper, of_ink).sum(axis=1) + either).astype(np.float64)
+def _along_words(evidence: Evidence, steps: np.ndarray) -> np.ndarray:
+    """Return the evidence for words at each angle, from their `_steps`, shape (m, k, w)."""
+    paper, ink = evidence.paper[:, None], evidence.ink[:, None]
+    every = np.concatenate([paper, evidence.between, ink], axis=1).transpose(2, 0, 1)
+    count, bands, kinds = every.shape
+    first = (np.arange(count * bands, dtype=np.int32) * kinds).reshape(count, bands, 1)
+    return np.take(np.ascontiguousarray(every), first + steps.transpose(2, 0, 1))
 
 
 def _covered_paths(seen: np.ndarray, as_paper: np.ndarray, of: Evidence) -> np.ndarray:
@@ -399,16 +453,29 @@ def _free_paths(evidence: Evidence) -> tuple[np.ndarray, np.ndarray]:
     white, dark = paper[0], ink[0]
     covered = np.full_like(white, _NEVER)
     of_white, of_dark, of_covered = np.zeros((3, len(white)), np.intp)
-    mixed = np.maximum(np.maximum(paper, ink), 0) - border
-    for of_paper, of_ink, of_border in zip(paper[1:], ink[1:], mixed[1:], strict=True):
+    between = evidence.between.max(axis=1, initial=0).T
+    mixed = np.cumsum(np.maximum(np.maximum(paper, ink), between), axis=0)
+    # An end of an arc is as long as blur makes it.
+    length = np.maximum(np.rint(_END * np.hypot(evidence.blur, _PHASE)), 1).astype(int)
+    bands = np.arange(len(white))
+    paths = np.empty((4, *paper.shape), paper.dtype)  # white, dark, and their borders
+    paths[:, 0] = white, dark, of_white, of_dark
+    for angle in range(1, len(paper)):
+        first = np.maximum(angle - length, 0)
+        from_white, from_dark, white_borders, dark_borders = paths[:, first, bands]
+        end = mixed[angle] - mixed[first, bands] - border
         begun, of_begun = _better(white, of_white, dark, of_dark)
-        to_white, to_dark = (dark + of_border, of_dark + 1), (white + of_border, of_white + 1)
         white, of_white = _better(white, of_white, covered, of_covered)
         dark, of_dark = _better(dark, of_dark, covered, of_covered)
-        white, of_white = _better(white + of_paper, of_white, *to_white)
-        dark, of_dark = _better(dark + of_ink, of_dark, *to_dark)
+        to_white, to_dark = (
+            (from_dark + end, dark_borders + 1),
+            (from_white + end, white_borders + 1),
+        )
+        white, of_white = _better(white + paper[angle], of_white, *to_white)
+        dark, of_dark = _better(dark + ink[angle], of_dark, *to_dark)
         covered, of_covered = _better(covered, of_covered, begun - cover, of_begun)
         covered = covered - cost
+        paths[:, angle] = white, dark, of_white, of_dark
     return _better(*_better(white, of_white, dark, of_dark), covered, of_covered)
 
 

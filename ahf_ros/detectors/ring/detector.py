@@ -32,6 +32,7 @@ from ahf_ros.detectors.ring.proposals import (
     measure_dots,
     measure_likely,
     propose_whole,
+    with_rims,
 )
 from ahf_ros.detectors.ring.refinement import refine_centres
 from ahf_ros.features import frame
@@ -164,6 +165,7 @@ def read_pyramid(
         part, fits = octave.pyramid.gray, [NO_FITS]
         for propose in proposals:
             proposed = propose(octave, settings.polarities, explained)
+            proposed = with_rims(proposed, families, octave.radii[0])
             dots = measure_dots(part, proposed, covariances=settings.report_undecoded)
             families = with_measured_bands(part, dots, families)
             by_name = {code.name: code for code in families}

@@ -38,7 +38,10 @@ _ACROSS = (0.3, 0.75)  # shares of the gap, between which edges of light show
 _ANGLES = 120  # at which large targets have all the evidence that readings can give
 _MAXIMUM_GROWTH = 0.3  # dot radii
 _RADIUS, _DEPTH = 2.25, 0.2  # of readings, and distance of their depths, dot radii
-_MIXED = (1.2, 0.5)  # deviations of blur that mix ln, to the dark and the bright side of edges
+_SHARE = 0.12  # error of shares of ink between paper and ink, as far apart as these are
+
+SHARES = (0.25, 0.5, 0.75)
+"""Of ink between paper and ink, where blur mixes both at ends of arcs."""
 
 SURPRISES = (0.05, 0.5)
 """Least and largest probability of light that nothing predicts."""
@@ -61,6 +64,8 @@ class Evidence(ArrayRecord):
     ----------
     paper, ink : ndarray of float32, shape (k, 2, m)
         Where the band is unmarked, and where it is marked.
+    between : ndarray of float32, shape (k, 2, s, m)
+        Where blur mixes both, for shares of ink in equal steps from paper to ink; s may be 0.
     weight : ndarray of float32, shape (k,)
         Of a reading, which is part of both; less than 1 where neighbours tell the same.
     dot : ndarray of float32, shape (k,)
@@ -69,18 +74,18 @@ class Evidence(ArrayRecord):
         Probability that an edge of light lies between two neighbouring readings.
     covered : ndarray of bool, shape (k, 2, m)
         Where something covers the ground beside the band.
-    mixed : ndarray of float32, shape (k, 2)
-        Angles on the paper's and on the ink's side of the end of an arc, whose readings blur makes
-        neither of both.
+    blur : ndarray of float64, shape (k,)
+        Of ends of arcs, standard deviation in angles.
     """
 
     paper: np.ndarray
     ink: np.ndarray
+    between: np.ndarray
     weight: np.ndarray
     dot: np.ndarray
     lit: np.ndarray
     covered: np.ndarray
-    mixed: np.ndarray
+    blur: np.ndarray
 
     def plus(self, levels: Evidence) -> Evidence:
         """Return the sum of the evidence of edges and of levels, where nothing covers the ground.
@@ -94,11 +99,13 @@ class Evidence(ArrayRecord):
         return Evidence(
             paper=np.where(self.covered, 0, self.paper) + np.where(across, 0, levels.paper),
             ink=np.where(self.covered, 0, self.ink) + np.where(across, 0, levels.ink),
+            between=np.where(self.covered[:, :, None], 0, self.between)
+            + np.where(across[:, :, None], 0, levels.between),
             weight=self.weight,
             dot=self.dot + levels.dot,
             lit=np.maximum(self.lit, levels.lit),
             covered=self.covered,
-            mixed=self.mixed,
+            blur=self.blur,
         )
 
 
@@ -129,9 +136,13 @@ def weights(polar: PolarImages) -> np.ndarray:
 
 
 def edge_evidence(
-    polar: PolarImages, radius: np.ndarray, growth: np.ndarray, band: tuple[float, float]
+    polar: PolarImages,
+    radius: np.ndarray,
+    growth: np.ndarray,
+    band: tuple[float, float],
+    shares: Sequence[float] = (),
 ) -> Evidence:
-    """Return the evidence of steps across the edges of bands.
+    """Return the evidence of steps across the edges of bands, and of those of shares of ink.
 
     From the radii of the dots as printed and the growth of their colour, (k,), units of the frame.
     """
@@ -151,18 +162,19 @@ def edge_evidence(
         for of_dot, at in zip(bare, (ground_at, band_at), strict=True)
     ]
     lit_ground = np.maximum(ground, polar.paper(ground, marked[0]))
-    paper, ink = _step_evidence(polar, inside, ground, edges, bare, marked)
+    paper, ink, *between = _step_evidence(polar, inside, ground, edges, bare, marked, shares)
     weight = weights(polar)
     visible = polar.reach[:, None] >= np.stack([inner + within, outer + beside], axis=1)[..., None]
     share = weight[:, None, None] * visible
     return Evidence(
         paper=paper * share,
         ink=ink * share,
+        between=_stacked(between, ink) * share[:, :, None],
         weight=weight,
         dot=np.zeros_like(weight),
         lit=edges.astype(np.float32),
         covered=_covered(polar, inside, lit_ground, ink > paper, visible),
-        mixed=_mixed(polar, band),
+        blur=_blur_along(polar, band),
     )
 
 
@@ -175,13 +187,15 @@ def _blurred(
     return np.asarray(above - below).T[..., None].astype(np.float32)
 
 
-def _mixed(polar: PolarImages, band: tuple[float, float]) -> np.ndarray:
-    """Return the angles that blur mixes at ends of arcs, see `Evidence`, shape (k, 2)."""
-    along = np.pi * sum(band) * polar.size / polar.gray.shape[1]
-    dark, bright = np.multiply.outer(_MIXED, polar.blur / along)
-    ink_is_dark = polar.polarity > 0
-    sides = np.where(ink_is_dark, bright, dark), np.where(ink_is_dark, dark, bright)
-    return np.stack(sides, axis=1).astype(np.float32)
+def _blur_along(polar: PolarImages, band: tuple[float, float]) -> np.ndarray:
+    """Return the blur of ends of arcs, standard deviations in angles, shape (k,)."""
+    return np.asarray(polar.blur / (np.pi * sum(band) * polar.size / polar.gray.shape[1]))
+
+
+def _stacked(between: Sequence[np.ndarray], like: np.ndarray) -> np.ndarray:
+    """Return arrays (k, 2, m) as one, (k, 2, n, m), of which there may be none."""
+    none = np.zeros((*like.shape[:2], 0, like.shape[2]), np.float32)
+    return np.stack(between, axis=2) if between else none
 
 
 def _covered(
@@ -228,12 +242,13 @@ def _step_evidence(
     edges: np.ndarray,
     bare: Sequence[np.ndarray],
     marked: Sequence[np.ndarray],
-) -> tuple[np.ndarray, np.ndarray]:
+    shares: Sequence[float],
+) -> list[np.ndarray]:
     """Return the evidence of steps from ground into bands, (k, 2, m), for paper and for ink.
 
     The shares of ink that blur leaves on ground and band, shape (k, 2, 1) each, are those of bare
     bands and of marked ones. Glare makes the step of a mark smaller. Where it makes ground white,
-    paper between is white.
+    paper between is white. Then comes that for shares of marks.
     """
     (level, noise), (beside, of_ground) = polar.logs(band), polar.logs(ground)
     blank, ink = (
@@ -255,13 +270,21 @@ def _step_evidence(
         less = glare & (more < 0) & (more > -np.abs(mark))
         inked = np.where(less, np.maximum(inked, 1 / np.maximum(np.abs(mark), _FLAT)), inked)
     lit = edges.astype(np.float32)[:, None, None]
+    densities = [flat, inked]
+    for share in shares:
+        on_ground, on_band = (
+            of_bare + np.float32(share) * (of_mark - of_bare)
+            for of_bare, of_mark in zip(bare, marked, strict=True)
+        )
+        mixed = polar.printed(polar.paper(ground, on_ground), on_band, band)
+        width = np.sqrt(_MARK**2 + (_SHARE * mark) ** 2 + noise**2 + expected**2)
+        densities.append(normal(level - polar.logs(mixed)[0], width))
     anything = _PLAIN * flat + (1 - _PLAIN) * _ANY
     clear = polar.tells(band)
-    paper, ink = (
+    return [
         np.where(clear, np.log(((1 - lit) * density + lit * _ANY) / anything), 0)
-        for density in (flat, inked)
-    )
-    return paper, ink
+        for density in densities
+    ]
 
 
 def _gain(paper: np.ndarray, ink: np.ndarray) -> np.ndarray:
@@ -278,6 +301,7 @@ def level_evidence(
     radii: np.ndarray,
     growth: np.ndarray,
     band: tuple[float, float],
+    shares: Sequence[float] = (),
 ) -> Evidence:
     """Return the evidence of levels in dots and bands, and beside these, under predicted light.
 
@@ -295,8 +319,13 @@ def level_evidence(
     spread, inked = np.where(known, spread, 1), polar.printed(light, share, levels)
     of_paper = np.sqrt(_PAPER_LEVEL**2 + noise**2 + spread**2)
     of_ink = np.sqrt(_INK_LEVEL**2 + noise**2 + (spread * _gain(light, inked)) ** 2)
-    errors = level - polar.logs(light)[0]
-    densities = [normal(errors, of_paper), normal(level - polar.logs(inked)[0], of_ink)]
+    of_light, of_inked = polar.logs(light)[0], polar.logs(inked)[0]
+    errors = level - of_light
+    densities = [normal(errors, of_paper), normal(level - of_inked, of_ink)]
+    of_share = np.sqrt(of_ink**2 + (_SHARE * (of_inked - of_light)) ** 2)
+    for of_mark in shares:
+        mixed = polar.logs(polar.printed(light, share * np.float32(of_mark), levels))[0]
+        densities.append(normal(level - mixed, of_share))
     anything = _PLAIN * densities[0] + (1 - _PLAIN) * _ANY
     depth = np.minimum(_DEPTH * polar.size / CORRELATION, 1)
     weight = (weights(polar) * depth).astype(np.float32)
@@ -309,7 +338,7 @@ def level_evidence(
         seen[..., half] &= ~(levels[..., half & on_ground] >= limit).any(axis=2, keepdims=True)
     dark = levels <= polar.shade[:, None, None]
     surprise = _surprise(errors, of_paper, seen & on_ground)
-    paper, ink = (
+    paper, ink, *between = (
         np.where(seen, np.log(((1 - surprise) * of + surprise * _ANY) / anything), 0)
         * weight[:, None, None]
         for of in densities
@@ -318,16 +347,17 @@ def level_evidence(
     beside = list(zip(halves, ground, strict=True))
     of_halves = [
         np.stack([of[..., half & in_band].sum(axis=2) + below for half, below in beside], axis=1)
-        for of in (paper, ink)
+        for of in (paper, ink, *between)
     ]
     return Evidence(
         paper=of_halves[0],
         ink=of_halves[1],
+        between=_stacked(of_halves[2:], of_halves[1]),
         weight=weight,
         dot=(ink - paper)[..., in_dot].sum(axis=(1, 2)),
         lit=surprise[:, 0, 0].astype(np.float32),
         covered=np.stack([dark[..., half & on_ground].any(axis=2) for half in halves], axis=1),
-        mixed=_mixed(polar, band),
+        blur=_blur_along(polar, band),
     )
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from ahf_ros.features import frame
 from ahf_ros.features.array_record import ArrayRecord
 from ahf_ros.features.circle_fit import Fit
+from ahf_ros.features.profiles import USUAL_BLUR
 from ahf_ros.features.robust import NORMAL
 from ahf_ros.features.sampling import sample_circles, within
 from ahf_ros.imaging.black import black_lift, lifted
@@ -38,6 +39,7 @@ _PERSPECTIVE = 1.5  # of circles, more than perspective makes one side of them l
 _SMALL = 7.0  # radius of a dot whose levels tell more than its edge, px
 _PRINTED = 0.25  # usual contrast of prints, up to which the levels of larger dots count
 _LEVELS = (0.75, 1.4)  # where the levels of dot and gap are read, dot radii
+_NARROW = 4.5  # width of a gap that blur fills, in deviations of it
 _MINIMUM_LEVEL = 1.0  # gray value that ratios are taken of
 _NOISE = (1.2, 40.0)  # smallest and largest noise, gray values
 _EVEN = 0.015  # deviation of ln of ground in even light
@@ -152,7 +154,7 @@ def polar_images(
     outermost = outer + _MARGIN
     radii = np.linspace(_INNERMOST, outermost, circles)
     values = np.maximum(sample_circles(gray, dots.frames, angles, radii), 0)
-    contrast, lift = _appearance(gray, dots)
+    contrast, lift = _appearance(gray, dots, band)
     values = lifted(values, lift.astype(np.float32)[:, None, None])
     places = [*(1 + (inner - 1) * GAP), *(outer + MARGIN)]
     ground = values[:, :, [np.abs(radii - place).argmin() for place in places]]
@@ -182,19 +184,28 @@ def angles_of(count: int) -> np.ndarray:
     return -2 * np.pi * (np.arange(count) + 0.5) / count
 
 
-def _appearance(gray: np.ndarray, dots: Fit) -> tuple[np.ndarray, np.ndarray]:
+def _appearance(
+    gray: np.ndarray, dots: Fit, band: tuple[float, float]
+) -> tuple[np.ndarray, np.ndarray]:
     """Return contrasts of dots, and gray values that black is to be lifted to, shape (k,) each.
 
     The contrast is that of the dot's edge. Where a camera sharpens, that edge is darker than marks
     are, and where marks are small blur makes them less dark. The levels beside the edge then tell
     more; at large dots only up to the usual contrast of prints, because light may change between.
+    Where blur fills the gap, the ground beyond the band tells it.
     """
     angles = 2 * np.pi * np.arange(24) / 24
-    values = sample_circles(gray, dots.frames, angles, np.array(_LEVELS))
-    inside, outside = np.moveaxis(np.maximum(values, _MINIMUM_LEVEL), 2, 0)
-    ratio = np.median(inside / outside, axis=1) ** dots.polarity
+    inner, outer = band
+    values = sample_circles(gray, dots.frames, angles, np.array([*_LEVELS, *(outer + MARGIN)]))
+    inside, outside, *beyond = np.moveaxis(np.maximum(values, _MINIMUM_LEVEL), 2, 0)
+    ratio, bare = (
+        np.median(inside / of, axis=1) ** dots.polarity
+        for of in (outside, np.mean(beyond, axis=0))
+    )
     by_levels = np.where(dots.size < _SMALL, ratio, np.minimum(ratio, _PRINTED))
     contrast = np.maximum(dots.contrast, by_levels)
+    narrow = (inner - 1) * dots.size < _NARROW * np.maximum(dots.blur, USUAL_BLUR)
+    contrast = np.where(narrow, np.minimum(contrast, np.maximum(bare, _PRINTED)), contrast)
     lift = black_lift(contrast, dots.bright)
     dark, bright = (lifted(of, lift) for of in (contrast * dots.bright, dots.bright))
     return np.maximum(dark, _MINIMUM_LEVEL) / np.maximum(bright, _MINIMUM_LEVEL), lift

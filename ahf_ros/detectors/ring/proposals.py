@@ -11,6 +11,7 @@ letters are.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -19,11 +20,13 @@ from ahf_ros.detectors.ring.circles import RAYS, REACH
 from ahf_ros.detectors.ring.known import Explained
 from ahf_ros.detectors.ring.likelihood import FEW_MARKS, band_edges, edge_evidence, growth_by
 from ahf_ros.detectors.ring.polar import DOT, MARGIN, PART, PolarImages, polar_images
+from ahf_ros.features import frame
 from ahf_ros.features.circle_fit import ENOUGH, NO_FITS, Fit, fit_dots
 from ahf_ros.features.dot_search import voted_dots, whole_dots
 from ahf_ros.features.dots import Dots
 from ahf_ros.features.pyramid import Octave
 
+_NARROW = 3.0  # width of a gap, px, that edges of a half do not show on both of its sides
 _PER_SECTOR, _CIRCLES = 5, 36  # angles of the shortest sectors, and circles
 _PHASES = 4  # of the sectors
 _MAXIMUM_SHIFT = 1.2  # of edges, px
@@ -56,6 +59,22 @@ def propose_voted(octave: Octave, polarities: Sequence[int], explained: Explaine
 
 PROPOSALS: tuple[Proposal, ...] = (propose_whole, propose_voted)
 """The ways to propose dots, the fastest first."""
+
+
+def with_rims(dots: Dots, families: Sequence[Family], min_radius: float) -> Dots:
+    """Return dots, and those in the middle of what may be the rim of a band about a narrow gap.
+
+    Edges of a half of an image do not show a dot whose gap is narrower than they are, but the rim
+    of a band with many marks. Dots and the bound of their radius are px of one image.
+    """
+    size, found = frame.mean_radii(dots.frames), [dots]
+    for inner, outer in dict.fromkeys(code.band for code in families if code.bounds is None):
+        dot = size / outer
+        some = np.flatnonzero((dot * (inner - 1) < _NARROW) & (dot > min_radius))
+        middle = dots.select(some)
+        frames = frame.scaled(middle.frames, np.full(len(some), 1 / outer))
+        found.append(replace(middle, frames=frames))
+    return Dots.joined(found)
 
 
 def measure_dots(gray: np.ndarray, dots: Dots, *, covariances: bool = False) -> Fit:

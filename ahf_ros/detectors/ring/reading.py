@@ -23,6 +23,7 @@ from ahf_ros.detectors.ring.light import clear_of, predicted_light
 from ahf_ros.detectors.ring.likelihood import (
     FEW_MARKS,
     HOPEFUL,
+    SHARES,
     Evidence,
     edge_evidence,
     growth_by,
@@ -68,7 +69,7 @@ def _read_part(gray: np.ndarray, dots: Fit, family: Family, prior: Prior) -> Hyp
     hopeful = HOPEFUL * min(1.0, least_marked(family) / FEW_MARKS)
     polar = polar_images(gray, dots, family.band, family.bits * PER_SECTOR)
     growth = best_growth(polar, family.band, prior)
-    edges = edge_evidence(polar, 1 - growth, growth, family.band)
+    edges = edge_evidence(polar, 1 - growth, growth, family.band, SHARES)
     words = decode(edges, _overhang(growth, family), family, prior.expected)
     read = np.flatnonzero(_mean_odds(words, edges.weight) > hopeful)
     edges, growth = edges.select(read), growth[read]
@@ -85,7 +86,7 @@ def _read_part(gray: np.ndarray, dots: Fit, family: Family, prior: Prior) -> Hyp
     fit = _by_dot(fit, printed, growth, _thin(printed, growth, family))
     growth = fit.polarity * fit.edge_shift / fit.size
     polar = polar_images(gray, fit, family.band, family.bits * PER_SECTOR)
-    edges = edge_evidence(polar, np.ones(len(read)), growth, family.band)
+    edges = edge_evidence(polar, np.ones(len(read)), growth, family.band, SHARES)
     overhang = _overhang(growth, family)
     words = decode(edges, overhang, family, prior.expected)
     words = _settled(gray, fit, polar, edges, words, growth, family, prior.expected)
@@ -155,7 +156,8 @@ def _settled(
     printed = family.band, family.circles
     light = predicted_light(gray, targets.frames, polar.lift, angles, radii, *printed)
     growth = growth[some]
-    evidence = edges.plus(level_evidence(polar, levels, *light, radii, growth, family.band))
+    of_levels = level_evidence(polar, levels, *light, radii, growth, family.band, SHARES)
+    evidence = edges.plus(of_levels)
     of_all = decode(evidence, _overhang(growth, family), family, expected)
     hidden = of_all.hidden | (polar.reach < of_band[0])
     # What speaks against no target is that of edges, so that all targets compare.
