@@ -172,10 +172,11 @@ def _circles_cover(family: CircleFamily, word: int, growth: float) -> Cover:
         distance = np.sqrt(x * x + y * y)
         width = _edge_width(jacobian, x, y, distance)
         inked = np.zeros_like(distance)
-        for index, radius in enumerate(radii):
-            sign = -1 if index % 2 else 1
-            inked += sign * _inside_share(np.float32(radius + sign * growth) - distance, width)
-        return inked
+        for outer, inner in zip(radii[::2], radii[1::2], strict=True):
+            ring = _inside_share(np.float32(outer + growth) - distance, width)
+            ring -= _inside_share(np.float32(inner - growth) - distance, width)
+            inked += np.maximum(ring, 0)
+        return np.minimum(inked, 1)
 
     return cover
 

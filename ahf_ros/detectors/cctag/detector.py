@@ -38,6 +38,7 @@ _COMMON_CENTRE = (8.0, 11.3), (11.3, 20.0)  # radii of targets whose rings vote 
 _COMMON_CENTRE_STEP, _COMMON_CENTRE_VOTES, _COMMON_CENTRE_SIZES = 1.0, 1.0, 1.25
 _FAINT = 3.0  # of their contrast, which narrow rings have little of
 _TELLING = 0.98  # confidence of targets that tell of others
+_CLEAR_OF_RIVALS = 19.0  # odds of the place of an ID against all others
 _SURE = 0.999  # confidence of targets that neither rivals nor another family put in doubt
 _PROBABLE = 0.5  # confidence of targets that tell of edges together
 _ROUNDS = 2  # in which doubtful targets are read with what others tell
@@ -89,12 +90,15 @@ class CctagDetector(FamilyDetector):
                 continue
             columns = [(it.x, it.y, it.semi_major, it.semi_minor, it.angle) for it in known]
             start = frame.affine_frames(*np.array(columns).T)
-            shift = np.array([target.edge_shift or 0.0 for target in known])
+            usual = Prior()
+            edges = np.array(
+                [(it.edge_shift or 0.0, usual.blur, usual.sharpening) for it in known]
+            )
             ids = np.array([it.id for it in known])
-            of = align(gray, start, ids, shift, family)
+            of = align(gray, start, ids, edges, family)
             light = in_light(gray, of, family)
             if light is not gray:
-                of = align(light, start, ids, shift, family)
+                of = align(light, start, ids, edges, family)
             moved = np.hypot(*(of.frames[:, :2, 2] - start[:, :2, 2]).T)
             reach = np.maximum(_MAXIMUM_MOVE, _MAXIMUM_MOVE_SHARE * frame.mean_radii(start))
             places = ellipse_fields(of.frames, of.covariance, of.edge_shift)
@@ -136,27 +140,26 @@ def _identified(
     A first reading knows one edge of light. Where it shows likely targets, all are read with more,
     and doubtful ones with what certain ones show.
     """
-    rings = identify(gray, frames, polarity, family, edges=1)
-    if not (rings.of_target >= _SURE_OF_TARGET).any():
+    rings = identify(gray, frames, polarity, family, most=1)
+    likely = rings.select(rings.of_target >= _SURE_OF_TARGET)
+    if not len(likely.ids):
         return rings.select(rings.of_target >= _POSSIBLE), gray
+    light = in_light(gray, likely, family)
+    camera = Prior.of_camera(align(light, likely.frames, likely.ids, likely.edges, family))
     first = rings.select(rings.confidence >= _TELLING)
-    rings = identify(gray, frames, polarity, family)
+    rings = identify(light, frames, polarity, family, camera)
     certain = rings.select(rings.confidence >= _CERTAIN)
     first = first.select(_alone(first.frames, certain.frames))
     rings = rings.select(_alone(rings.frames, first.frames))
     rings = Aligned.joined([rings, first])
     rings = rings.select(rings.of_target >= _POSSIBLE)
     likely = rings.select(rings.of_target >= _SURE_OF_TARGET)
-    light = in_light(gray, likely, family)
-    if light is not gray:
-        again = align(light, likely.frames, likely.ids, likely.shift, family)
-        likely = replace(again, margin=likely.margin)
-    known, news = Prior(), light is not gray
+    known = Prior()
     for _ in range(_ROUNDS):
         prior = Prior.after(likely.select(likely.confidence >= _PROBABLE))
-        if prior == known and not news:
+        if prior == known:
             break
-        known, news = prior, False
+        known = prior
         told = likely.confidence >= _TELLING
         unread = frames[_alone(frames, likely.frames)]
         doubtful = np.concatenate([likely.frames[~told], unread])
@@ -186,7 +189,7 @@ def _single(rings: Aligned) -> Aligned:
     odds = rings.confidence / np.maximum(1 - rings.confidence, 1e-9)
     rivals = (rings.ids[:, None] == rings.ids) & ~_near(rings.frames, rings.frames)
     of_rivals = rivals @ np.where(rings.confidence < _SURE, odds, 0.0)
-    single = odds / (1 + odds + of_rivals) >= _CERTAIN
+    single = (odds / (1 + odds) >= _CERTAIN) & (odds >= _CLEAR_OF_RIVALS * of_rivals)
     return rings.select(single | (rings.confidence < _CERTAIN))
 
 

@@ -15,7 +15,15 @@ from itertools import product
 
 import numpy as np
 
-from ahf_ros.detectors.cctag.rays import ANGLES, PROFILE, normal_share
+from ahf_ros.detectors.cctag.rays import (
+    ANGLES,
+    BLACK,
+    PROFILE,
+    WHITE,
+    Seen,
+    clipped,
+    normal_share,
+)
 from ahf_ros.features import frame
 from ahf_ros.features.array_record import ArrayRecord
 from ahf_ros.features.sampling import sample_circles
@@ -44,6 +52,9 @@ _MOST_CURVED, _MOST_MOVED = 1.2, 0.2  # the latter in a round
 _HIGHEST, _MOST_LIGHT = 2.5, 4.0  # ln of an edge, and of light
 _EVIDENCE = 25.0  # twice the ln of the likelihood, that an edge adds
 _LEAST_VARIANCE = 0.003**2
+_OF_CLIPPED = 0.1  # weight of gray values that are clipped
+_MANY = 0.2  # share of gray values, from which it matters that they are clipped
+_INTERPOLATED = 0.58  # distance of what linear interpolation mixes with a quarter each, px
 _BRIGHTEST = 2.0  # gray value, of the mean, that has more weight than others
 
 
@@ -116,12 +127,15 @@ class Lights(ArrayRecord):
         return Lights(frames, of_light, edges, slope, uneven, frame.moved(frames, changes))
 
 
-def lit(gray: np.ndarray, frames: np.ndarray, lights: Lights) -> np.ndarray:
-    """Return the gray values of rays without their light, float32, shape (k, rays, n)."""
-    values = np.maximum(sample_circles(gray, frames, ANGLES, PROFILE), 0)
-    values /= lights.at(frames, ANGLES, PROFILE)
-    lit: np.ndarray = values / np.maximum(values.mean(axis=2, keepdims=True), 1e-3)
-    return lit
+def lit(gray: np.ndarray, frames: np.ndarray, lights: Lights) -> Seen:
+    """Return the gray values of rays without their light."""
+    values = np.maximum(sample_circles(gray, frames, ANGLES, PROFILE), BLACK)
+    many = clipped(values).mean(axis=(1, 2)) > _MANY
+    light = lights.at(frames, ANGLES, PROFILE)
+    light *= np.maximum((values / light).mean(axis=2, keepdims=True), 1e-3)
+    lowest, highest = (np.float32(of) / light for of in (BLACK, WHITE))
+    apart = np.rint(_INTERPOLATED / frame.mean_radii(frames) / (PROFILE[1] - PROFILE[0]))
+    return Seen(values / light, lowest, highest, many, apart.astype(int))
 
 
 @dataclass(frozen=True, slots=True)
@@ -143,21 +157,20 @@ class _Scene(ArrayRecord):
     weight: np.ndarray  # of a sum of 1, the same shape
     slope: np.ndarray  # of what is the same all around, by the radius, (k, n)
     size: np.ndarray  # px, (k,)
+    area: np.ndarray  # of what is not clipped, px, (k,)
 
     @staticmethod
     def of(gray: np.ndarray, frames: np.ndarray, size: np.ndarray) -> _Scene:
-        values = np.maximum(sample_circles(gray, frames, _ANGLES, _RADII), 1)
+        values = sample_circles(gray, frames, _ANGLES, _RADII)
+        known = np.where(clipped(values), np.float32(_OF_CLIPPED), np.float32(1))
+        values = np.maximum(values, 1)
         bright = np.minimum(values / values.mean(axis=(1, 2), keepdims=True), _BRIGHTEST)
         weight = _RADII * bright**2  # noise is that of gray values
+        weight *= known
         weight /= weight.sum(axis=(1, 2), keepdims=True)
         values = np.log(values)
-        return _Scene(values, values, weight, _slopes(values, weight), size)
-
-    @property
-    def area(self) -> np.ndarray:
-        """Pixels, (k,)."""
-        area: np.ndarray = np.pi * (_RADII[-1] * self.size) ** 2
-        return area
+        area = np.pi * (_RADII[-1] * size) ** 2 * known.mean(axis=(1, 2))
+        return _Scene(values, values, weight, _slopes(values, weight), size, area)
 
     def in_light(self, fit: _Fit) -> _Scene:
         """Return what is seen in a light that is known."""

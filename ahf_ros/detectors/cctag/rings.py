@@ -30,9 +30,16 @@ from ahf_ros.features.dots import Dots
 from ahf_ros.features.logistic import logistic
 from ahf_ros.features.sampling import sample_circles
 
-_FEW_ANGLES, _FEW_RADII = ANGLES[::2], slice(None, None, 2)  # of a glance
+_FEW_ANGLES, _FEW_RADII = ANGLES[::2], 2  # of a glance: one of so many radii
+_CLIPPED = 0.25, 0.5  # shares of the contrast that over-exposure clips
+_GLANCED = (
+    *((0.0, more, 0.0) for more in (0.0, 1.0)),
+    *((shift, 0.0, share) for shift in (-0.4, 0.0) for share in _CLIPPED),
+)  # edges: growth of what is dark, px, sharpening, and the share that is clipped
+_GLANCED_BLUR = 0.9  # px
 _SIZES = 1.05  # ratio of radii that share templates, and of hypotheses of the radius
-_TRIED_SHIFTS, _TRIED_BLURS = (-1.2, -0.6, 0.0, 0.6, 1.2), (-1.0, 0.0, 1.4)  # deviations
+_TRIED_SHIFTS = -1.2, -0.6, 0.0, 0.6, 1.2  # deviations
+_TRIED_BLURS, _TRIED_SHARPENINGS = (-1.0, 0.0, 1.4), (3.0, 7.0)  # the same
 _GROWN = (0.85, 0.9, 0.95, 1.0, 1.05)  # radii of the outermost circle, where that was found
 _NARROWEST = 0.5  # ring that is read, px; blur hides others
 _PROMISING = 0.6  # share of a profile that rings explain, from which they are looked at
@@ -44,6 +51,7 @@ _GAMMA = 2.2  # of gray values, unless they are light
 _CLEARLY = 0.03  # `left` by which rings must be better explained
 _TELLING_OF_GAMMA = 16  # targets
 _ENOUGH = 4  # certain targets, that tell of the edges of an image
+_OF_CAMERA = 0.03  # standard deviation of the sharpening of one camera
 _SCALES = (0.93, 0.965, 1.0, 1.035, 1.07)  # of the radius, about a frame
 _READINGS = 5  # IDs that are brought onto the image from a frame
 _REPEATS, _STAYING = 6, 0.1  # until the square of a move is a small part of the variance
@@ -55,12 +63,20 @@ _LEAST_VARIANCE = 1e-6  # of gray values, of their mean
 _OF_VARIANCE = 2.0  # of gray values, that their model adds
 _SHARPEST, _SOFTEST = 0.35, 1.5  # blur: px, and in narrow rings, which more of it would hide
 _MOST_SHIFT = 0.45  # of edges, in narrow rings
+_SHARPENED = 1.5  # standard deviation of the unsharp mask of a camera that sharpens, px
+_SHARPENINGS = 0.0, 4.0  # amounts of it
+_HELD = 1e9  # weight of a bound
+_MOST_OF_EDGES = 0.3, 0.3, 1.0  # change of shift, ln of the blur and sharpening in a round
 _INDEPENDENT = 0.3  # distance of independent readings along a profile, px
 _SYSTEMATIC = 0.004  # standard deviation of what pixels and interpolation do to a centre, px
 _CLEAREST = 0.2  # share of rays
 _AGREEING = 0.5  # share of what a ray shows, that the rings explain
 _OF_TARGET = np.array([-14.1, -1.5, 3.0, -1.0])  # of one, `clear`, `plain`, `unusual`
 _USUAL_EDGES = 0.13, 0.3  # deviations of growth, px, and of ln of the blur, of targets
+_GROWTH_HIDES, _SHARPENING_HIDES = (
+    3.0,
+    0.8,
+)  # ln of odds: at the most growth, and of an amount of 1
 _PLAIN = -5.0, 5.0  # beyond which it says no more
 _BY_SIZE, _USUAL_SIZE = 2.5, 12.0  # what `plain` grows by ln of the radius, from its px
 _AS_CLEAR = -6.0  # as it gets, by anything that is round
@@ -69,38 +85,76 @@ _FEW_READINGS = 2  # IDs that are brought onto the image before the others
 _OF_ID = np.array([-1.4, 1.2])  # of one, margin
 
 
+Edge = tuple[float, float, float, float]
+"""Growth of ink and blur, px, sharpening, and the share of the contrast that is clipped.
+
+Below 0 it is clipped from bright ink, otherwise from bright paper.
+"""
+
+
 @dataclass(frozen=True, slots=True)
 class Prior:
-    """What is known of the edges of an image: growth of ink and blur, px.
+    """What is known of the edges of an image: growth of ink, px, blur, px, and sharpening.
 
-    The deviations are standard deviations, px and of ln of the blur, which is that of the image
-    with that of pixels and of interpolation.
+    The deviations are standard deviations, px, of ln of the blur, which is that of the image with
+    that of pixels and of interpolation, and of the sharpening, the amount of an unsharp mask.
     """
 
     shift: float = 0.0
     blur: float = 0.85
-    deviations: tuple[float, float] = (0.5, 0.35)
+    sharpening: float = 0.0
+    deviations: tuple[float, float, float] = (0.5, 0.35, 0.35)
 
     def squares(self, rings: Aligned) -> np.ndarray:
         """Return the squares of the distances from what is known, in deviations, shape (k,)."""
-        of_shift, of_blur = self.deviations
-        return ((rings.shift - self.shift) / of_shift) ** 2 + (
-            np.log(rings.blur / self.blur) / of_blur
-        ) ** 2
+        away = self.away(rings.shift, rings.blur, rings.sharpening) / self.deviations
+        squares: np.ndarray = (away**2).sum(axis=1)
+        return squares
 
-    @property
-    def tried(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
-        """Shifts and blurs of templates, px."""
-        of_shift, of_blur = self.deviations
-        shifts = tuple(round(self.shift + of * of_shift, 2) for of in _TRIED_SHIFTS)
-        return shifts, tuple(round(self.blur * np.exp(of * of_blur), 2) for of in _TRIED_BLURS)
+    def away(self, shift: np.ndarray, blur: np.ndarray, sharpening: np.ndarray) -> np.ndarray:
+        """Return how far edges are from what is known, in the units of deviations, (k, 3)."""
+        return np.stack(
+            [shift - self.shift, np.log(blur / self.blur), sharpening - self.sharpening], axis=1
+        )
+
+    def tried(self, polarity: int) -> tuple[Edge, ...]:
+        """Return the edges of templates, also clipped ones unless the polarity is 0."""
+        of_shift, of_blur, of_sharpening = self.deviations
+        tried = list(product(_TRIED_SHIFTS, _TRIED_BLURS, [(0.0, 0.0)]))
+        others = [(more, 0.0) for more in _TRIED_SHARPENINGS]
+        others += [(0.0, polarity * of) for of in _CLIPPED if polarity]
+        tried += list(product(_TRIED_SHIFTS[::2], [0.0], others))
+        return tuple(
+            (
+                round(self.shift + shift * of_shift, 2),
+                round(self.blur * math.exp(blur * of_blur), 2),
+                round(self.sharpening + more * of_sharpening, 2),
+                clipped,
+            )
+            for shift, blur, (more, clipped) in tried
+        )
+
+    @staticmethod
+    def of_camera(rings: Aligned) -> Prior:
+        """Return what likely targets tell of the camera of an image."""
+        if len(rings.ids) < _ENOUGH:
+            return Prior()
+        usual = Prior().deviations[:2]
+        return Prior(
+            sharpening=float(np.median(rings.sharpening)), deviations=(*usual, _OF_CAMERA)
+        )
 
     @staticmethod
     def after(rings: Aligned) -> Prior:
         """Return what certain targets tell of the others."""
         if len(rings.ids) < _ENOUGH:
             return Prior()
-        return Prior(float(np.median(rings.shift)), float(np.median(rings.blur)), (0.1, 0.1))
+        return Prior(
+            float(np.median(rings.shift)),
+            float(np.median(rings.blur)),
+            float(np.median(rings.sharpening)),
+            (0.1, 0.1, _OF_CAMERA),
+        )
 
 
 _USUAL = Prior()
@@ -115,13 +169,20 @@ class Aligned(ArrayRecord):
     covariance: np.ndarray  # (k, 2, 2), of centres, px^2
     shift: np.ndarray  # (k,), by which ink has grown, px
     blur: np.ndarray  # (k,), standard deviation, px
+    sharpening: np.ndarray  # (k,), amount of an unsharp mask
     colour: np.ndarray  # (k,), 1 where ink is dark, -1 where it is bright
     rays: np.ndarray  # (k,), share of the rays that show the rings by themselves
     clear: np.ndarray  # (k,), ln of the share of a ray that is not explained, of clear rays
     left: np.ndarray  # (k,), ln of the share of a ray that is not explained, on the mean
     plain: np.ndarray  # (k,), the same of any two edges, less that of the rings
-    unusual: np.ndarray  # (k,), half the squares of deviations of edges, where light hides rays
+    unusual: np.ndarray  # (k,), half the squares of deviations of edges, that leave a doubt
+    known: np.ndarray  # (k,), share of gray values that are not clipped
     margin: np.ndarray  # (k,), ln of the odds against the next ID; NaN before it is known
+
+    @property
+    def edges(self) -> np.ndarray:
+        """Shift, blur and sharpening, shape (k, 3)."""
+        return np.stack([self.shift, self.blur, self.sharpening], axis=1)
 
     @property
     def edge_shift(self) -> np.ndarray:
@@ -143,7 +204,9 @@ class Aligned(ArrayRecord):
         return self.of_target * logistic(self.margin[:, None], _OF_ID)
 
 
-NOTHING = Aligned(*(np.zeros((0, 3, 3)), np.zeros(0, int), np.zeros((0, 2, 2)), *np.zeros((9, 0))))
+NOTHING = Aligned(
+    *(np.zeros((0, 3, 3)), np.zeros(0, int), np.zeros((0, 2, 2)), *np.zeros((11, 0)))
+)
 
 
 def likely_rings(
@@ -176,8 +239,9 @@ def likely_rings(
     )
     size, centres = frame.mean_radii(frames), frames[:, :2, 2]
     kept: list[int] = []
-    for index in np.argsort(-share, kind='stable').tolist():
-        if share[index] < _PROMISING or len(kept) == _LOOKED_AT * len(table):
+    evidence = np.where(share < _PROMISING, 0, -size * np.log1p(-share))
+    for index in np.argsort(-evidence, kind='stable').tolist():
+        if not evidence[index] or len(kept) == _LOOKED_AT * len(table):
             break
         away = np.hypot(*(centres[kept] - centres[index]).T)
         if not (away < _APART * np.maximum(size[kept], size[index])).any():
@@ -189,15 +253,15 @@ def _glance(
     gray: np.ndarray, frames: np.ndarray, polarity: int, family: CircleFamily
 ) -> np.ndarray:
     """Return the share of the mean profiles of frames that the rings of some ID explain, (k,)."""
-    along = PROFILE[_FEW_RADII]
-    profiles = _profiles(gray, frames, polarity, _FEW_ANGLES, along)
+    profiles = _profiles(gray, frames, polarity, _FEW_ANGLES, PROFILE[::_FEW_RADII])
+    edges = tuple(
+        (polarity * shift, _GLANCED_BLUR, more, polarity * of) for shift, more, of in _GLANCED
+    )
     share = np.zeros(len(frames))
     for step, some in _by_size(frames):
-        templates = _templates(family, step, (0.0,), (0.9,))[0][:, _FEW_RADII]
-        weight = np.sqrt(along / along.sum())
-        own = profiles[some] * weight
-        rings = _shares(own, templates, weight, along).max(axis=1)
-        discs = _shares(own, _discs(step)[:, _FEW_RADII], weight, along, 1).max(axis=1)
+        templates = _templates(family, step, edges, _FEW_RADII)[0]
+        rings = _shares(profiles[some], templates, _FEW_RADII, 0).max(axis=1)
+        discs = _shares(profiles[some], _discs(step, edges), _FEW_RADII).max(axis=1)
         share[some] = np.where(rings > discs, rings, 0.0)
     return share
 
@@ -220,46 +284,71 @@ def _profiles(
 
 
 def _shares(
-    profiles: np.ndarray,
-    templates: np.ndarray,
-    weight: np.ndarray,
-    along: np.ndarray,
-    colours: int = -1,
+    profiles: np.ndarray, templates: np.ndarray, every: int = 1, most: float = np.inf
 ) -> np.ndarray:
-    """Return the shares of weighted profiles (k, n) that templates (t, n) explain, (k, t)."""
-    line, _ = np.linalg.qr(np.stack([weight, along * weight], axis=1))
-    profiles, inks = (of - (of @ line) @ line.T for of in (profiles, templates * weight))
-    inks /= np.linalg.norm(inks, axis=1, keepdims=True)
+    """Return the shares of profiles (k, n) that templates (t, n) explain, shape (k, t).
+
+    The product of a template with what it explains is at most so large; ink is below paper.
+    """
+    weight, line = _weights(every)
+    profiles = profiles * weight
+    profiles -= (profiles @ line) @ line.T
     total = np.maximum((profiles**2).sum(axis=1, keepdims=True), 1e-9)
-    product = profiles @ inks.T
-    shares: np.ndarray = (np.minimum(product, 0) if colours < 0 else product) ** 2 / total
+    shares: np.ndarray = np.minimum(profiles @ templates.T, most) ** 2 / total
     return shares
+
+
+@lru_cache
+def _weights(every: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return the weights of profiles, (n,), and a basis of weighted straight lines, (n, 2)."""
+    along = PROFILE[::every]
+    weight = np.sqrt(along / along.sum())
+    line, _ = np.linalg.qr(np.stack([weight, along * weight], axis=1))
+    return weight, line
+
+
+def _normalised(inks: np.ndarray, every: int) -> np.ndarray:
+    """Return weighted inks less straight lines, with squares of a sum of 1."""
+    weight, line = _weights(every)
+    inks = inks * weight
+    inks -= (inks @ line) @ line.T
+    normalised: np.ndarray = inks / np.linalg.norm(inks, axis=1, keepdims=True)
+    return normalised
 
 
 @lru_cache(maxsize=256)
 def _templates(
-    family: CircleFamily, step: int, shifts: tuple[float, ...], blurs: tuple[float, ...]
+    family: CircleFamily, step: int, edges: tuple[Edge, ...], every: int = 1
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the ink of all IDs under shifts and blurs, shape (t, n), and the shift of each."""
+    """Return the ink of all IDs with some edges, shape (t, n), and these edges, (e, 3)."""
     size, table = _SIZES**step, family.radii(family.numbers)
     # IDs share circles, so that there are few to compute.
     signed, inverse = np.unique((table * _signs(table)).round(6), return_inverse=True)
-    radii, sign = np.abs(signed)[:, None], np.sign(signed)[:, None]
     most = _MOST_SHIFT * family.narrow * size
-    edges = list(product(dict.fromkeys(float(np.clip(of, -most, most)) for of in shifts), blurs))
+    tried = dict.fromkeys((float(np.clip(of[0], -most, most)), *of[1:]) for of in edges)
     inks = []
-    for shift, blur in edges:
-        place = np.hypot(PROFILE, blur / size)
-        circles = sign * normal_share(((radii - place) * size + sign * shift) / blur)
-        inks.append(circles[inverse.reshape(table.shape)].sum(axis=1))
-    return np.concatenate(inks), np.array([shift for shift, _ in edges])
+    for *edge, clipped in tried:
+        of_circles = (np.full(len(signed), of) for of in (size, *edge))
+        circles = _circles(signed[:, None], *of_circles)[0][:, ::every]
+        inks.append(_clipped(circles[inverse.reshape(table.shape)].sum(axis=1), clipped))
+    return _normalised(np.concatenate(inks), every), np.array([edge[:3] for edge in tried])
 
 
 @lru_cache(maxsize=64)
-def _discs(step: int) -> np.ndarray:
-    """Return the profiles of single discs of all radii, shape (t, n)."""
+def _discs(step: int, edges: tuple[Edge, ...]) -> np.ndarray:
+    """Return the profiles of single discs of all radii, shape (t, n), as for a glance."""
     radii = np.linspace(PROFILE[0], PROFILE[-1], 100)[3:-3, None]
-    return normal_share((radii - PROFILE) * _SIZES**step / 0.9)
+    inks = []
+    for *edge, clipped in edges:
+        of_discs = (np.full(len(radii), of) for of in (_SIZES**step, *edge))
+        inks.append(_clipped(_circles(radii, *of_discs)[0][:, ::_FEW_RADII], clipped))
+    return _normalised(np.concatenate(inks), _FEW_RADII)
+
+
+def _clipped(inks: np.ndarray, share: float) -> np.ndarray:
+    """Return inks less a share of the contrast, below 0 of ink and otherwise of paper."""
+    clipped: np.ndarray = np.maximum(inks, share) if share > 0 else np.minimum(inks, 1 + share)
+    return clipped if share else inks
 
 
 def identify(
@@ -268,48 +357,48 @@ def identify(
     polarity: int,
     family: CircleFamily,
     prior: Prior = _USUAL,
-    edges: int = EDGES,
+    most: int = EDGES,
 ) -> Aligned:
-    """Return the best reading of each target about outermost circles, known to about a tenth.
+    """Return the best reading of each target about outermost circles, edges to about a tenth.
 
     The light about each has so many edges at the most.
     """
     if not len(frames):
         return NOTHING
-    lights = Lights.about(gray, frames, edges)
+    lights = Lights.about(gray, frames, most)
     lights = lights.select(lights.uneven < _UNEVEN)
     if not len(lights.frames):
         return NOTHING
-    starts, ids, shift = _likely_ids(gray, lights, polarity, family, prior)
+    starts, ids, edges = _likely_ids(gray, lights, polarity, family, prior)
     # The likeliest ID often brings the frame to its place even if it is the wrong one.
-    first = align(gray, starts[:, 0], ids[:, 0], shift[:, 0], family, prior, lights)
+    first = align(gray, starts[:, 0], ids[:, 0], edges[:, 0], family, prior, lights)
     likely = first.of_target > _HOPELESS[0]
-    lights = Lights.about(gray, first.frames[likely], edges)
+    lights = Lights.about(gray, first.frames[likely], most)
     again = _likely_ids(gray, lights, polarity, family, prior)
-    starts, ids, shift = (
+    starts, ids, edges = (
         np.concatenate([more, of[likely]], axis=1)
-        for of, more in zip((starts, ids, shift), again, strict=True)
+        for of, more in zip((starts, ids, edges), again, strict=True)
     )
     few = np.arange(ids.shape[1]) < _FEW_READINGS
     tried = np.nonzero(np.broadcast_to(few, ids.shape))
     of_first = lights.select(tried[0])
-    first = align(gray, starts[tried], ids[tried], shift[tried], family, prior, of_first)
+    first = align(gray, starts[tried], ids[tried], edges[tried], family, prior, of_first)
     possible = first.of_target.reshape(-1, _FEW_READINGS).max(axis=1) > _HOPELESS[1]
     if not possible.any():
         return NOTHING
     first = first.select(np.repeat(possible, _FEW_READINGS))
-    starts, ids, shift = (of[possible] for of in (starts, ids, shift))
+    starts, ids, edges = (of[possible] for of in (starts, ids, edges))
     lights = lights.select(possible)
     tried = np.nonzero(np.broadcast_to(few, ids.shape))
     others = np.nonzero(_unlike_before(ids) & ~few)
     of_more = lights.select(others[0])
-    more = align(gray, starts[others], ids[others], shift[others], family, prior, of_more)
+    more = align(gray, starts[others], ids[others], edges[others], family, prior, of_more)
     every = Aligned.joined([first, more])
     rows, columns = np.concatenate([tried, others], axis=1)
     independent = frame.mean_radii(starts[:, 0]) * np.ptp(PROFILE) / _INDEPENDENT
     left = np.where(every.colour == polarity, every.left, 0.0)
     cost = np.full(ids.shape, np.inf)
-    cost[rows, columns] = (independent[rows] * left + prior.squares(every)) / 2
+    cost[rows, columns] = (independent[rows] * every.known * left + prior.squares(every)) / 2
     index = np.zeros(ids.shape, int)
     index[rows, columns] = np.arange(len(rows))
     best = every.select(index[np.arange(len(ids)), cost.argmin(axis=1)])
@@ -334,7 +423,7 @@ def _settled(
     for _ in range(_REPEATS):
         some = rings.select(moving)
         light = lights.select(moving)
-        again = align(gray, some.frames, some.ids, some.shift, family, prior, light)
+        again = align(gray, some.frames, some.ids, some.edges, family, prior, light)
         away = again.frames[:, :2, 2] - some.frames[:, :2, 2]
         spread = away[:, :, None] * away[:, None]
         again = replace(again, covariance=again.covariance + spread)
@@ -351,25 +440,31 @@ def _settled(
 def _likely_ids(
     gray: np.ndarray, lights: Lights, polarity: int, family: CircleFamily, prior: Prior
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return frames, (k, n, 3, 3), of IDs that profiles are like, (k, n), and shifts of edges."""
-    weight, frames = np.sqrt(PROFILE / PROFILE.sum()), lights.moved
+    """Return frames, (k, n, 3, 3), of IDs that profiles are like, (k, n), and edges, (k, n, 3)."""
+    frames = lights.moved
     shape = len(_SCALES), len(frames), len(family.numbers)
-    shares, shifts = np.empty(shape), np.empty(shape)
+    shares, edges = np.empty(shape), np.empty((*shape, 3))
     scaled = np.stack([frame.scaled(frames, np.full(len(frames), of)) for of in _SCALES])
-    for of_scale, share, shift in zip(scaled, shares, shifts, strict=True):
-        values = lit(gray, of_scale, lights)
-        profiles = polarity * values.mean(axis=1, dtype=np.float64) * weight
-        for step, some in _by_size(of_scale):
-            templates, of_shift = _templates(family, step, *prior.tried)
-            found = _shares(profiles[some], templates, weight, PROFILE)
-            found = found.reshape(len(some), -1, len(family.numbers))
-            share[some], shift[some] = found.max(axis=1), of_shift[found.argmax(axis=1)]
+    for of_scale, share, edge in zip(scaled, shares, edges, strict=True):
+        seen = lit(gray, of_scale, lights)
+        profiles = polarity * seen.values.mean(axis=1, dtype=np.float64)
+        for step, of_size in _by_size(of_scale):
+            for clipped in (0, 1):
+                some = of_size[seen.clipped[of_size] == clipped]
+                if not len(some):
+                    continue
+                templates, tried = _templates(family, step, prior.tried(polarity * clipped))
+                found = _shares(profiles[some], templates, most=0)
+                found = found.reshape(len(some), -1, len(family.numbers))
+                share[some], edge[some] = found.max(axis=1), tried[found.argmax(axis=1)]
     order = np.argsort(-shares.max(axis=0), axis=1, kind='stable')[:, :_READINGS]
     # Where narrow and wide rings take turns, growth of the ink makes one word the other.
     order = np.concatenate([order, family.numbers[-1] - order[:, :1]], axis=1)
     rows = np.arange(len(frames))[:, None]
     scale = shares.argmax(axis=0)[rows, order]
-    return scaled[scale, rows], order, shifts[scale, rows, order]
+    found = edges[scale, rows, order]
+    found[..., 1] = prior.blur
+    return scaled[scale, rows], order, found
 
 
 def in_light(gray: np.ndarray, rings: Aligned, family: CircleFamily) -> np.ndarray:
@@ -378,10 +473,11 @@ def in_light(gray: np.ndarray, rings: Aligned, family: CircleFamily) -> np.ndarr
     Blur mixes light, and not gray values, which matters where rings are narrow.
     """
     some = rings.select(np.argsort(-rings.plain, kind='stable')[:_TELLING_OF_GAMMA])
-    if not len(some.ids):
+    if len(some.ids) < _ENOUGH:
         return gray
     light: np.ndarray = 255 * (gray.clip(0) / 255) ** np.float32(_GAMMA)
-    left = align(light, some.frames, some.ids, some.shift, family).left
+    lights = Lights.about(light, some.frames)
+    left = _settled(light, some, family, _USUAL, lights).left
     return light if np.median(left - some.left) < -_CLEARLY else gray
 
 
@@ -389,15 +485,15 @@ def align(
     gray: np.ndarray,
     frames: np.ndarray,
     ids: np.ndarray,
-    shift: np.ndarray,
+    edges: np.ndarray,
     family: CircleFamily,
     prior: Prior = _USUAL,
     lights: Lights | None = None,
 ) -> Aligned:
     """Bring the rings of IDs (k,) onto an image from frames (k, 3, 3), known to about a tenth.
 
-    `shift`, shape (k,), is the growth of ink to begin with, px. The lights are those about the
-    frames, unless they are given.
+    The edges to begin with, (k, 3), are growth of ink and blur, px, and sharpening. The lights are
+    those about the frames, unless they are given.
     """
     if lights is None:
         lights = Lights.about(gray, frames)
@@ -406,7 +502,7 @@ def align(
         [NOTHING]
         + [
             _aligned(
-                gray, frames[part], ids[part], shift[part], family, prior, lights.select(part)
+                gray, frames[part], ids[part], edges[part], family, prior, lights.select(part)
             )
             for part in parts
         ]
@@ -417,21 +513,21 @@ def _aligned(
     gray: np.ndarray,
     frames: np.ndarray,
     ids: np.ndarray,
-    shift: np.ndarray,
+    edges: np.ndarray,
     family: CircleFamily,
     prior: Prior,
     lights: Lights,
 ) -> Aligned:
     """Return what `align` does, by Gauss-Newton with robust weights."""
     count = len(frames)
-    blur = np.full(count, prior.blur)
+    shift, blur, sharpening = edges.T
     for outlier in _OUTLIERS:
         size = frame.mean_radii(frames)
-        values = lit(gray, frames, lights)
-        ink, slope, by_shift, by_blur = _rings(family, ids, size, shift, blur)
-        rays = robust_rays(values, ink, outlier)
+        seen = lit(gray, frames, lights)
+        ink, slope, *by_edges = _rings(family, ids, size, shift, blur, sharpening)
+        rays = robust_rays(seen, ink, outlier)
         by_radius = [slope, slope * ALONG, slope * ALONG**2]
-        normal, right = rays.equations(np.stack([*by_radius, by_shift, by_blur], axis=1), ink)
+        normal, right = rays.equations(np.stack([*by_radius, *by_edges], axis=1), ink)
         variance = (rays.weight * rays.errors**2).sum(axis=(1, 2)) / rays.weight.sum(axis=(1, 2))
         area = size**2 * (PROFILE[1] - PROFILE[0]) * (ANGLES[1] - ANGLES[0])
         each = (
@@ -442,11 +538,17 @@ def _aligned(
         usual = _usual_perspective(frames)
         normal[:, 5:7, 5:7] += usual
         right[:, 5:7] -= (usual @ frames[:, 2, :2, None])[..., 0]
-        normal[:, [7, 8], [7, 8]] += np.array(prior.deviations) ** -2
-        known = np.stack([shift - prior.shift, np.log(blur / prior.blur)], axis=1)
-        right[:, 7:] -= known * np.array(prior.deviations) ** -2
+        known = np.array(prior.deviations) ** -2
+        normal[:, range(7, 10), range(7, 10)] += known
+        right[:, 7:] -= prior.away(shift, blur, sharpening) * known
         change = np.linalg.solve(normal, right[..., None])[..., 0]
-        limit = np.concatenate([np.full(7, _MAXIMUM_CHANGE), [0.3, 0.3]])
+        # What goes beyond a bound is held there, so that the others do not make up for it.
+        bounded = np.clip(sharpening + change[:, 9], *_SHARPENINGS) - sharpening
+        held = np.where(bounded == change[:, 9], 0.0, _HELD)
+        normal[:, 9, 9] += held
+        right[:, 9] += held * bounded
+        change = np.linalg.solve(normal, right[..., None])[..., 0]
+        limit = np.concatenate([np.full(7, _MAXIMUM_CHANGE), _MOST_OF_EDGES])
         change = np.clip(change, -limit, limit)
         frames = frame.moved(frames, change[:, :7])
         narrow = family.narrow * size
@@ -454,13 +556,15 @@ def _aligned(
         blur = np.clip(
             blur * np.exp(change[:, 8]), _SHARPEST, np.maximum(_SOFTEST * narrow, _SHARPEST)
         )
+        sharpening = np.clip(sharpening + change[:, 9], *_SHARPENINGS)
     covariance = np.linalg.inv(normal)[:, :2, :2]
     affine = frame.local_affine(frames)
     covariance = affine @ covariance @ affine.transpose(0, 2, 1) + _SYSTEMATIC**2 * np.eye(2)
-    values = lit(gray, frames, lights)
-    ink = _rings(family, ids, frame.mean_radii(frames), shift, blur)[0]
-    rays = Rays.of(values, ink, np.broadcast_to(ALONG, values.shape))
-    squares = (of**2 @ ALONG for of in (rays.errors, rays.deviations(values)))
+    seen = lit(gray, frames, lights)
+    size = frame.mean_radii(frames)
+    ink = _rings(family, ids, size, shift, blur, sharpening)[0]
+    rays = Rays.of(seen, ink, np.broadcast_to(ALONG, seen.values.shape))
+    squares = (of**2 @ ALONG for of in (rays.errors, rays.deviations(seen.values)))
     left, shown = (of.astype(np.float64) for of in squares)
     agreeing = (left < (1 - _AGREEING) * shown) & (
         np.sign(rays.step) == np.sign(np.median(rays.step, axis=1))[:, None]
@@ -473,12 +577,20 @@ def _aligned(
         covariance=covariance,
         shift=shift,
         blur=blur,
+        sharpening=sharpening,
         colour=-np.sign(np.median(rays.step, axis=1)),
         rays=agreeing.mean(axis=1),
         clear=np.quantile(rest, _CLEAREST, axis=1),
         left=rest.mean(axis=1),
-        plain=_plain(values, good, ink, blur / frame.mean_radii(frames)),
-        unusual=_unusual(shift, blur, prior) * np.minimum(3 * (1 - agreeing.mean(axis=1)), 1),
+        plain=_plain(
+            rays.model + rays.errors / np.maximum(rays.gain, 0.05),
+            rays.model,
+            good[..., None] * rays.weight * rays.gain**2,
+            blur / size,
+        ),
+        unusual=_unusual(shift, blur, prior) * np.minimum(3 * (1 - agreeing.mean(axis=1)), 1)
+        + _hiding(shift, sharpening, family.narrow * size),
+        known=(rays.gain @ ALONG).mean(axis=1) / ALONG.sum(),
         margin=np.full(count, np.nan),
     )
 
@@ -488,6 +600,14 @@ def _unusual(shift: np.ndarray, blur: np.ndarray, prior: Prior) -> np.ndarray:
     deviations = np.stack([shift - prior.shift, np.log(blur / prior.blur)], axis=1) / _USUAL_EDGES
     squares: np.ndarray = (deviations**2).sum(axis=1) / 2
     return squares
+
+
+def _hiding(shift: np.ndarray, sharpening: np.ndarray, narrow: np.ndarray) -> np.ndarray:
+    """Return by how much growth and sharpening hide narrow rings, (k,), which have so many px."""
+    grown = _GROWTH_HIDES * (shift / (_MOST_SHIFT * narrow)) ** 8
+    sharpened = _SHARPENING_HIDES * sharpening**2 / (1 + np.abs(sharpening))
+    hidden: np.ndarray = grown + sharpened * (_SHARPENED / narrow) ** 2
+    return hidden
 
 
 def _usual_perspective(frames: np.ndarray) -> np.ndarray:
@@ -503,49 +623,87 @@ def _usual_perspective(frames: np.ndarray) -> np.ndarray:
     return usual
 
 
-def _plain(values: np.ndarray, good: np.ndarray, ink: np.ndarray, blur: np.ndarray) -> np.ndarray:
+def _plain(seen: np.ndarray, rings: np.ndarray, good: np.ndarray, blur: np.ndarray) -> np.ndarray:
     """Return by how much better rings explain a profile than two edges of any height do, (k,).
 
-    It is the difference of ln of what is left of the weighted mean of rays, whose weights `good`
-    have the shape (k, rays). The blur is in radii.
+    It is the difference of ln of what is left of the weighted mean of rays. What is seen, what
+    the rings make of it and the weights `good` have the shape (k, rays, n). The blur is in radii.
     """
-    weight = np.sqrt(PROFILE / PROFILE.sum())
-    line, _ = np.linalg.qr(np.stack([weight, PROFILE * weight], axis=1))
-    profiles = (good[..., None] * values).sum(axis=1) / good.sum(axis=1)[:, None] * weight
+    shown = good.sum(axis=1)
+    profiles, inks = ((good * of).sum(axis=1) / np.maximum(shown, 1e-9) for of in (seen, rings))
+    weights = np.sqrt(shown / shown.sum(axis=1, keepdims=True))
     edges = np.linspace(PROFILE[0], PROFILE[-1], 66)[3:-3, None]
-    found = np.empty(len(values))
-    for index, (profile, rings) in enumerate(zip(profiles, ink * weight, strict=True)):
+    found = np.empty(len(seen))
+    for index, (profile, ink, weight) in enumerate(zip(profiles, inks, weights, strict=True)):
+        line, _ = np.linalg.qr(np.stack([weight, PROFILE * weight], axis=1))
         steps = normal_share((edges - PROFILE) / blur[index]) * weight
-        profile, rings, steps = (of - (of @ line) @ line.T for of in (profile, rings, steps))
+        profile, ink = profile * weight, ink * weight
+        profile, ink, steps = (of - (of @ line) @ line.T for of in (profile, ink, steps))
         total = profile @ profile
-        steps = steps / np.linalg.norm(steps, axis=1, keepdims=True)
+        steps = steps / np.maximum(np.linalg.norm(steps, axis=1, keepdims=True), 1e-9)
         along, alike = steps @ profile, steps @ steps.T
         both = along[:, None] ** 2 + along**2 - 2 * alike * along[:, None] * along
         shares = both / np.maximum(1 - alike**2, 1e-3) / total
-        share = (rings @ profile) ** 2 / (rings @ rings) / total
+        share = (ink @ profile) ** 2 / max(ink @ ink, 1e-12) / total
         found[index] = np.log(max(1 - shares.max(), 1e-6) / max(1 - share, 1e-6))
     return found
 
 
 def _rings(
-    family: CircleFamily, ids: np.ndarray, size: np.ndarray, shift: np.ndarray, blur: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    family: CircleFamily,
+    ids: np.ndarray,
+    size: np.ndarray,
+    shift: np.ndarray,
+    blur: np.ndarray,
+    sharpening: np.ndarray,
+) -> tuple[np.ndarray, ...]:
     """Return the ink of IDs along the profile, shape (k, n), and its derivatives.
 
-    These are by the radius, in radii of the target, by the shift, px, and by ln of the blur.
+    These are by the radius, in radii of the target, by the shift, px, by ln of the blur and by the
+    sharpening.
     """
     radii = family.radii(ids)
-    sign = _signs(radii)[:, None]
-    size, shift, blur = (of[:, None, None].astype(np.float32) for of in (size, shift, blur))
+    return _circles(_signs(radii) * radii, size, shift, blur, sharpening)
+
+
+def _circles(
+    signed: np.ndarray,
+    size: np.ndarray,
+    shift: np.ndarray,
+    blur: np.ndarray,
+    sharpening: np.ndarray,
+) -> tuple[np.ndarray, ...]:
+    """Return what `_rings` does, of circles of radii (k, c), below 0 where paper fills them."""
+    size, shift, blur, sharpening = (
+        of[:, None, None].astype(np.float32) for of in (size, shift, blur, sharpening)
+    )
+    signed = signed[..., None].astype(np.float32)
+    sign = np.sign(signed)
+    radii = np.abs(signed) * size + sign * shift
+    seen = _blurred(radii, sign, size, blur)
+    wide = np.hypot(blur, np.float32(_SHARPENED))
+    masked = _blurred(radii, sign, size, wide)
+    masked[3] *= ((blur / wide) ** 2)[:, 0]
+    more = sharpening[:, 0]
+    return *((1 + more) * of - more * less for of, less in zip(seen, masked, strict=True)), (
+        seen[0] - masked[0]
+    )
+
+
+def _blurred(
+    radii: np.ndarray, sign: np.ndarray, size: np.ndarray, blur: np.ndarray
+) -> list[np.ndarray]:
+    """Return the ink of circles of radii (k, c, 1), px, and its derivatives, shape (k, n) each."""
     # Blur moves what lies near to the centre outwards, on the mean (Rice).
     place = np.sqrt(ALONG**2 + (blur / size) ** 2)
-    away = (radii.astype(np.float32)[..., None] * size + sign * shift - place * size) / blur
-    ink = (sign * normal_share(away)).sum(axis=1)
-    density = np.exp(-0.5 * away**2) / math.sqrt(2 * math.pi)
-    slope = -(sign * density * size / blur).sum(axis=1)
-    by_shift = (density / blur).sum(axis=1)
-    by_blur = -(sign * density * away).sum(axis=1)
-    return ink, slope, by_shift, by_blur
+    away = (radii - place * size) / blur
+    density = sign * np.exp(-0.5 * away**2) / math.sqrt(2 * math.pi)
+    return [
+        (sign * normal_share(away)).sum(axis=1),
+        -(density * size / blur).sum(axis=1),
+        (sign * density / blur).sum(axis=1),
+        -(density * away).sum(axis=1),
+    ]
 
 
 def _signs(radii: np.ndarray) -> np.ndarray:
