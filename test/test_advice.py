@@ -43,8 +43,16 @@ def shown(**changes: object) -> np.ndarray:
             {'family': 'gsi'},
             [r'[56] dots of 1\.4 px are too small: 2\.5 px would do'],
         ),
-        ({}, {'min_radius': 14.0}, [r'12 dots have a radius of (8\.9|9\.[01]) px, min_radius is 14']),
-        ({}, {'max_radius': 6.0}, [r'12 dots have a radius of (8\.9|9\.[01]) px, max_radius is 6']),
+        (
+            {},
+            {'min_radius': 14.0},
+            [r'12 dots have a radius of (8\.9|9\.[01]) px, min_radius is 14'],
+        ),
+        (
+            {},
+            {'max_radius': 6.0},
+            [r'12 dots have a radius of (8\.9|9\.[01]) px, max_radius is 6'],
+        ),
         ({}, {'polarity': 'bright'}, ['12 dots with a band of 12 .* dark, polarity is bright']),
         (
             {'family': 'cct10', 'edge_shift': -1.0},
