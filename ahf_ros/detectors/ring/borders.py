@@ -23,7 +23,7 @@ _CONTRAST = 0.5  # share of the step of a mark, from which a border is seen
 _ERROR, _PIXELS = 0.15, 0.4  # standard deviation of the place of a border, angles and px
 _ANYWHERE = 0.1  # share of borders that light moves
 _UNSEEN = 2.3  # price of an end that is not seen, as of one that is anywhere
-_RARE = 13.0  # log odds of a cover against a word that no family has
+_RARE = 12.0  # log odds of a cover against a word that no family has
 
 
 def with_ends(

@@ -28,7 +28,6 @@ _DRAW = 5.0  # lead of a word that is not expected, which is as good as none
 _NEAR = 3  # angles on either side of the clearest one
 _REFINED = 2  # best words, that compete at the phases beside theirs as well
 _PHASE = 0.5  # error of the phase of sectors, angles
-_END = 2.3  # length of an end of an arc, from an eighth of ink to seven, in deviations of its blur
 _NEVER = np.float32(-np.inf)
 
 CLEAR = 15.0
@@ -454,28 +453,16 @@ def _free_paths(evidence: Evidence) -> tuple[np.ndarray, np.ndarray]:
     covered = np.full_like(white, _NEVER)
     of_white, of_dark, of_covered = np.zeros((3, len(white)), np.intp)
     between = evidence.between.max(axis=1, initial=0).T
-    mixed = np.cumsum(np.maximum(np.maximum(paper, ink), between), axis=0)
-    # An end of an arc is as long as blur makes it.
-    length = np.maximum(np.rint(_END * np.hypot(evidence.blur, _PHASE)), 1).astype(int)
-    bands = np.arange(len(white))
-    paths = np.empty((4, *paper.shape), paper.dtype)  # white, dark, and their borders
-    paths[:, 0] = white, dark, of_white, of_dark
-    for angle in range(1, len(paper)):
-        first = np.maximum(angle - length, 0)
-        from_white, from_dark, white_borders, dark_borders = paths[:, first, bands]
-        end = mixed[angle] - mixed[first, bands] - border
+    mixed = np.maximum(np.maximum(paper, ink), between) - border
+    for of_paper, of_ink, of_border in zip(paper[1:], ink[1:], mixed[1:], strict=True):
         begun, of_begun = _better(white, of_white, dark, of_dark)
+        to_white, to_dark = (dark + of_border, of_dark + 1), (white + of_border, of_white + 1)
         white, of_white = _better(white, of_white, covered, of_covered)
         dark, of_dark = _better(dark, of_dark, covered, of_covered)
-        to_white, to_dark = (
-            (from_dark + end, dark_borders + 1),
-            (from_white + end, white_borders + 1),
-        )
-        white, of_white = _better(white + paper[angle], of_white, *to_white)
-        dark, of_dark = _better(dark + ink[angle], of_dark, *to_dark)
+        white, of_white = _better(white + of_paper, of_white, *to_white)
+        dark, of_dark = _better(dark + of_ink, of_dark, *to_dark)
         covered, of_covered = _better(covered, of_covered, begun - cover, of_begun)
         covered = covered - cost
-        paths[:, angle] = white, dark, of_white, of_dark
     return _better(*_better(white, of_white, dark, of_dark), covered, of_covered)
 
 
