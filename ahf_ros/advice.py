@@ -114,7 +114,9 @@ def _lines(image: np.ndarray, settings: DetectorSettings, expected: int) -> Iter
 
 def _of_repeated_ids(image: np.ndarray, settings: DetectorSettings) -> Iterator[str]:
     """Yield which IDs are read in several places, so that none of these is reported."""
-    found = create_detector(settings=replace(settings, report_undecoded=True))(image)
+    found: list[Target] = []
+    with suppress(ValueError):  # which the identification has said
+        found = create_detector(settings=replace(settings, report_undecoded=True))(image)
     read = [it for it in found if isinstance(it, UndecodedTarget) and it.reason == 'contested']
     counts = Counter((it.likely_family, it.likely_id) for it in read)
     for (name, number), count in counts.most_common(_NAMED):
