@@ -119,6 +119,7 @@ def test_dots_of_no_target_are_reported_on_request(name: str, changes: dict) -> 
     others = [target for target in found if target.id == UNDECODED]
     assert {target.id for target in decoded} == {target.id for target in shown.targets}
     assert others and all(target.code == 0 for target in others)
+    assert all(type(it) is int for target in others for it in (target.id, target.code))
     assert name != 'gsi' or not any(target.confidence for target in others)
     for target in decoded:
         assert isinstance(target, DottedTarget)

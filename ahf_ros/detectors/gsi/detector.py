@@ -256,9 +256,9 @@ def uncoded(
     for target in targets:
         for x, y, radius, *_ in getattr(target, 'dots', ()):
             found &= np.hypot(frames[:, 0, 2] - x, frames[:, 1, 2] - y) > radius
-    none = np.zeros(int(found.sum()))
+    none = np.zeros(int(found.sum()), int)
     return targets_from_frames(
-        frames[found], measured.covariance[found], none + UNDECODED, none, none, ''
+        frames[found], measured.covariance[found], none + UNDECODED, none, none.astype(float), ''
     )
 
 
