@@ -73,10 +73,8 @@ _CLEAREST = 0.2  # share of rays
 _AGREEING = 0.5  # share of what a ray shows, that the rings explain
 _OF_TARGET = np.array([-14.1, -1.5, 3.0, -1.0])  # of one, `clear`, `plain`, `unusual`
 _USUAL_EDGES = 0.13, 0.3  # deviations of growth, px, and of ln of the blur, of targets
-_GROWTH_HIDES, _SHARPENING_HIDES = (
-    3.0,
-    0.8,
-)  # ln of odds: at the most growth, and of an amount of 1
+_GROWTH_HIDES = 3.0  # ln of odds, at the most growth
+_SHARPENING_HIDES = 0.8  # ln of odds, of an amount of 1
 _PLAIN = -5.0, 5.0  # beyond which it says no more
 _BY_SIZE, _USUAL_SIZE = 2.5, 12.0  # what `plain` grows by ln of the radius, from its px
 _AS_CLEAR = -6.0  # as it gets, by anything that is round

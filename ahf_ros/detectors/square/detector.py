@@ -60,6 +60,7 @@ class SquareDetector(FamilyDetector):
         """Identify the markers of one image; see `Detector`."""
         return self.refine(image, self.draft(image))
 
+    @one_blas_thread()
     def draft(self, image: np.ndarray) -> list[Target]:
         """Identify the markers of one image, with the corners of contours, to about a pixel."""
         check_image(image)
