@@ -22,10 +22,10 @@ from ahf_ros.detectors.cctag.rays import (
     WHITE,
     Seen,
     clipped,
-    normal_share,
 )
 from ahf_ros.features import frame
 from ahf_ros.features.array_record import ArrayRecord
+from ahf_ros.features.normal import normal_integral
 from ahf_ros.features.sampling import sample_circles
 
 _ANGLES, _RADII = ANGLES[::2], PROFILE[::2].astype(np.float32)
@@ -200,7 +200,7 @@ class _Scene(ArrayRecord):
         for _ in range(_ROUNDS):
             away, across, along = _away(fit.edges, _X, _Y)
             width = _own_widths(fit.edges, _widths(self.size))
-            step, by_share = _logarithms(normal_share(away / width), fit.edges)
+            step, by_share = _logarithms(normal_integral(away / width), fit.edges)
             density = np.exp(-0.5 * (away / width) ** 2) / width / math.sqrt(2 * math.pi)
             density *= by_share * fit.heights[:, _OTHERS:, None, None].astype(np.float32)
             _, offset, curved, *_ = _columns(fit.edges)
@@ -304,7 +304,7 @@ def _away(
 
 def _steps(edges: np.ndarray, x: np.ndarray, y: np.ndarray, width: np.ndarray) -> np.ndarray:
     """Return the steps of edges (k, e, 5) at points, in their heights, shape (k, e, m, n)."""
-    share = normal_share(_away(edges, x, y)[0] / _own_widths(edges, width))
+    share = normal_integral(_away(edges, x, y)[0] / _own_widths(edges, width))
     return _logarithms(share, edges)[0]
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -154,9 +153,3 @@ def _as_seen(seen: Seen, model: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         return values / 2 + (before + after) / 4
 
     return seen.values - mixed(shown), mixed((shown == model).astype(np.float32))
-
-
-def normal_share(x: np.ndarray) -> np.ndarray:
-    """Return the share of a normal distribution below x, to 0.0005 (Page, JRSS C 1977, 26, 75)."""
-    share: np.ndarray = 0.5 * (1 + np.tanh(math.sqrt(2 / math.pi) * x * (1 + 0.044715 * x * x)))
-    return share

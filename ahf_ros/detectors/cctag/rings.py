@@ -21,13 +21,13 @@ from ahf_ros.detectors.cctag.rays import (
     ANGLES,
     PROFILE,
     Rays,
-    normal_share,
     robust_rays,
 )
 from ahf_ros.features import frame
 from ahf_ros.features.array_record import ArrayRecord
 from ahf_ros.features.dots import Dots
 from ahf_ros.features.logistic import logistic
+from ahf_ros.features.normal import normal_integral
 from ahf_ros.features.sampling import sample_circles
 
 _FEW_ANGLES, _FEW_RADII = ANGLES[::2], 2  # of a glance: one of so many radii
@@ -634,7 +634,7 @@ def _plain(seen: np.ndarray, rings: np.ndarray, good: np.ndarray, blur: np.ndarr
     found = np.empty(len(seen))
     for index, (profile, ink, weight) in enumerate(zip(profiles, inks, weights, strict=True)):
         line, _ = np.linalg.qr(np.stack([weight, PROFILE * weight], axis=1))
-        steps = normal_share((edges - PROFILE) / blur[index]) * weight
+        steps = normal_integral((edges - PROFILE) / blur[index]) * weight
         profile, ink = profile * weight, ink * weight
         profile, ink, steps = (of - (of @ line) @ line.T for of in (profile, ink, steps))
         total = profile @ profile
@@ -697,7 +697,7 @@ def _blurred(
     away = (radii - place * size) / blur
     density = sign * np.exp(-0.5 * away**2) / math.sqrt(2 * math.pi)
     return [
-        (sign * normal_share(away)).sum(axis=1),
+        (sign * normal_integral(away)).sum(axis=1),
         -(density * size / blur).sum(axis=1),
         (sign * density / blur).sum(axis=1),
         -(density * away).sum(axis=1),

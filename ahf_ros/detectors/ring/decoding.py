@@ -14,8 +14,9 @@ import numpy as np
 
 from ahf_ros.codes.ring import Family
 from ahf_ros.detectors.ring.codewords import best_words, likeliest_bits, margins, prior
-from ahf_ros.detectors.ring.likelihood import SURPRISES, Evidence, normal_integral
+from ahf_ros.detectors.ring.likelihood import SURPRISES, Evidence
 from ahf_ros.features.array_record import ArrayRecord
+from ahf_ros.features.normal import normal_integral
 
 _COVER = 6.0  # price of something that covers a stretch of the band
 _MAXIMUM_READING = 5.0  # for or against a word

@@ -21,6 +21,7 @@ import numpy as np
 from ahf_ros.detectors.ring.polar import CORRELATION, LIGHT_EDGE, PolarImages
 from ahf_ros.features.array_record import ArrayRecord
 from ahf_ros.features.circle_fit import SOFT
+from ahf_ros.features.normal import normal_integral
 from ahf_ros.imaging.image import SATURATED
 from ahf_ros.imaging.logarithm import LOG_OFFSET
 
@@ -372,9 +373,3 @@ def normal(values: np.ndarray, spread: np.ndarray) -> np.ndarray:
     """Return the densities of values under normal distributions about 0."""
     density: np.ndarray = np.exp(-0.5 * (values / spread) ** 2) / (spread * np.sqrt(2 * np.pi))
     return density
-
-
-def normal_integral(values: np.ndarray) -> np.ndarray:
-    """Return the integral of the normal distribution up to values (Page 1977), to 0.0002."""
-    scaled = np.clip(values, -5, 5)
-    return np.asarray(1 / (1 + np.exp(-2 * np.sqrt(2 / np.pi) * (scaled + 0.044715 * scaled**3))))

@@ -20,7 +20,7 @@ References
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -32,6 +32,7 @@ from ahf_ros.detectors.square.sides import (
     square_frames,
 )
 from ahf_ros.features.frame import project
+from ahf_ros.features.normal import normal_integral
 from ahf_ros.features.profiles import USUAL_BLUR
 from ahf_ros.features.robust import NORMAL, geman_mcclure
 from ahf_ros.features.sampling import sample, within
@@ -94,7 +95,7 @@ def _blurred(prints: np.ndarray, places: np.ndarray, blur: np.ndarray) -> list[n
     edges = np.linspace(-0.5, 0.5, prints.shape[1] + 1)
     deviations = (places[:, None] - edges) / blur[:, None, None]
     density = np.exp(-(deviations**2) / 2) / np.sqrt(2 * np.pi) / blur[:, None, None]
-    shares = -np.diff(_normal(deviations))
+    shares = -np.diff(normal_integral(deviations))
     of_place, of_blur = -np.diff(density), np.diff(density * deviations)
     ink = prints.astype(np.float64)
     along = shares @ ink, of_place @ ink, of_blur @ ink
@@ -106,17 +107,6 @@ def _blurred(prints: np.ndarray, places: np.ndarray, blur: np.ndarray) -> list[n
         along[2] @ turned[0] + along[0] @ turned[2],
     )
     return [of.reshape(len(prints), -1) for of in blurred]
-
-
-_GRID = np.linspace(-6, 6, 4097)
-_STEPS = np.exp(-(_GRID**2) / 2)
-_TABLE = np.concatenate([[0.0], np.cumsum(_STEPS[1:] + _STEPS[:-1])])
-_TABLE /= _TABLE[-1]
-
-
-def _normal(values: np.ndarray) -> np.ndarray:
-    """Return the normal distribution, to about 1e-6."""
-    return np.interp(values, _GRID, _TABLE)
 
 
 def lay_outlines(gray: np.ndarray, corners: np.ndarray) -> np.ndarray:
@@ -161,13 +151,10 @@ def _laid(
     Of a print of one cell only what is inside its outline is known, by half of a marker's cell;
     then, the growth of ink is not known.
     """
-    down, across = (of.ravel() for of in np.meshgrid(places, places, indexing='ij'))
-    if whole := prints.shape[1] > 1:
-        known = np.full(len(across), True)
-    else:
-        known = np.maximum(np.abs(across), np.abs(down)) > 0.5 - 0.5 / cells
-    down, across = down[known], across[known]
-    grid = np.stack([across, down], axis=1)
+    grid = np.stack(np.meshgrid(places, places), axis=2).reshape(-1, 2)
+    whole = prints.shape[1] > 1
+    known = whole | (np.abs(grid).max(axis=1) > 0.5 - 0.5 / cells)
+    grid = grid[known]
     frames, size = square_frames(corners), _lengths(corners)
     blur, levels = USUAL_BLUR / size, np.zeros((len(frames), _LEVELS))
     laid, share = corners.copy(), np.zeros(len(frames))
@@ -177,29 +164,22 @@ def _laid(
         points = project(frames[active], grid)
         values = sample(gray, points).astype(np.float64)
         inside = within(points, gray.shape)
-        ink, x, y, soft = (of[:, known] for of in _blurred(prints[active], places, blur[active]))
-        linear = np.empty((*ink.shape, _LEVELS))
-        linear[..., 0], linear[..., 3], linear[..., 6] = 1, ink, whole * np.hypot(x, y)
-        linear[..., 1:3] = grid
-        linear[..., 4:6] = ink[..., None] * grid
+        ink = [of[:, known] for of in _blurred(prints[active], places, blur[active])]
+        linear = _of_levels(ink, grid, whole)
         if not number:
             levels = _solved(linear, inside, values)
         residual = values - (linear @ levels[active, :, None])[..., 0]
-        step = levels[active, 3:6] @ np.stack([np.ones_like(across), across, down])
+        step = levels[active, 3:6] @ np.stack([np.ones(len(grid)), *grid.T])
         usual = np.maximum(NORMAL * np.median(np.abs(residual), axis=1), _USUAL_RESIDUAL)
         weights = geman_mcclure(inside, residual / (_OUTLIER * usual[:, None]))
-        x, y = x * step, y * step
-        moved = (x * across, x * down, x, y * across, y * down, y)
-        bent = moved[0] + moved[4]
-        columns = (*moved, -bent * across, -bent * down, -soft * step)
-        full = np.concatenate([np.stack(columns, axis=2), -linear], axis=2)
+        full = np.concatenate([_of_place(ink, grid, step), -linear], axis=2)
         normal = _normal_matrix(full, weights)
         scores = full * (weights * residual)[..., None]
         change = -np.linalg.solve(normal, scores.sum(axis=1)[..., None])[..., 0]
-        place = np.tile(np.eye(3), (len(active), 1, 1))
         limit = _LARGEST_STEP / cells
-        place.reshape(-1, 9)[:, :_PLACE] += np.clip(change[:, :_PLACE], -limit, limit)
-        frames[active] = frames[active] @ place
+        moved = np.tile(np.eye(3), (len(active), 1, 1))
+        moved.reshape(-1, 9)[:, :_PLACE] += np.clip(change[:, :_PLACE], -limit, limit)
+        frames[active] = frames[active] @ moved
         side = size[active]
         softer = blur[active] + change[:, _PLACE]
         blur[active] = np.clip(softer, _SHARPEST / side, _SOFTEST / cells)
@@ -221,6 +201,25 @@ def _laid(
             break
     near = np.linalg.norm(laid - corners, axis=2).max(axis=1) < np.maximum(size / cells, _NEAR)
     return Sides(laid, np.where(near, share, 0.0), covariance, shift)
+
+
+def _of_levels(ink: Sequence[np.ndarray], grid: np.ndarray, whole: bool) -> np.ndarray:
+    """Return the derivatives of gray values by the levels and the growth of ink, (k, n, 7)."""
+    shares, x, y, _ = ink
+    linear = np.empty((*shares.shape, _LEVELS))
+    linear[..., 0], linear[..., 1:3] = 1, grid
+    linear[..., 3], linear[..., 4:6] = shares, shares[..., None] * grid
+    linear[..., 6] = whole * np.hypot(x, y)
+    return linear
+
+
+def _of_place(ink: Sequence[np.ndarray], grid: np.ndarray, step: np.ndarray) -> np.ndarray:
+    """Return the derivatives of residuals by a homography and the blur, (k, n, 9)."""
+    _, x, y, soft = (of * step for of in ink)
+    across, down = grid.T
+    moved = (x * across, x * down, x, y * across, y * down, y)
+    bent = moved[0] + moved[4]
+    return np.stack([*moved, -bent * across, -bent * down, -soft], axis=2)
 
 
 def _normal_matrix(columns: np.ndarray, weights: np.ndarray) -> np.ndarray:
