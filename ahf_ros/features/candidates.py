@@ -244,10 +244,9 @@ def find_peaks(
     which = _promising(columns, rows, (planes * tall, wide), needed)
     if not len(which):
         return _NO_PEAKS
-    cells, counts = np.unique(rows[which] * np.int32(wide) + columns[which], return_counts=True)
     votes = np.zeros(planes * tall * wide, np.uint16)
-    votes[cells] = counts
-    cells = cells[counts > _OWN * needed]
+    np.add.at(votes, rows[which] * np.int32(wide) + columns[which], np.uint16(1))
+    cells = np.flatnonzero(votes > _OWN * needed)
     sums = _weighted(votes, cells, wide)
     enough = sums > needed
     cells, sums = cells[enough], sums[enough]
