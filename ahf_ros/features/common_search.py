@@ -46,21 +46,24 @@ def dots_in_common(
     max_radius: float,
     polarities: Sequence[int],
     explained: Sequence[np.ndarray] | np.ndarray = (),
+    *,
+    smaller: float = 1.0,
 ) -> Dots:
     """Return the dots that a search finds for one detector, which may share it with others.
 
-    Explained outlines, px, have the shape (m, 2) each. Shared dots may be a little beyond the
-    bounds of the radius.
+    Explained outlines, px, have the shape (m, 2) each. Where blur makes dots look smaller, they
+    are looked for from so many times the smallest radius on. Shared dots may be a little beyond
+    the bounds of the radius.
     """
     if common is None:
-        return search(min_radius, max_radius, polarities, explained=explained)
+        return search(smaller * min_radius, max_radius, polarities, explained=explained)
     if way not in common.found:
-        low = min(min_radius, common.min_radius)
+        low = smaller * min(min_radius, common.min_radius)
         found = search(low, max_radius, common.polarities, explained=explained)
         common.found[way] = found
     found = common.found[way]
     major = ellipse_axes(found.frames)[0]
-    of_size = (major * _BEYOND >= min_radius) & (major <= max_radius * _BEYOND)
+    of_size = (major * _BEYOND >= smaller * min_radius) & (major <= max_radius * _BEYOND)
     found = found.select(of_size & np.isin(found.polarity, polarities))
     return found.select(~_within(found, explained))
 

@@ -7,12 +7,22 @@ along. In even light they need none.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from functools import partial
 
 import cv2
 import numpy as np
 
+from ahf_ros.features.common_search import BLOBS, dots_in_common
 from ahf_ros.features.dots import NO_DOTS, Dots, best
 from ahf_ros.features.frame import affine_frames
+from ahf_ros.features.log_edges import LOG_SCALE
+from ahf_ros.features.pyramid import ImagePyramid
+
+LARGEST = 12.0
+"""Semi-major axis up to which dots are looked for as blobs, px."""
+
+BLURRED = 0.8
+"""Radius of a blob whose edge is blurred, in radii of the smallest dot."""
 
 MAXIMUM_BLOBS = 20_000
 """Small dots kept at the most, those with the highest contrast."""
@@ -29,6 +39,21 @@ _MINIMUM_PIXELS = 4
 _FILLED = (0.7, 1.35)  # pixels of a dot over the area of its ellipse
 _TILE = 32  # side of a tile, px; empty tiles are left out
 _MAXIMUM_TILES = 0.3  # of the image; where there are more, it is looked at as a whole
+
+
+def small_dots_in(
+    pyramid: ImagePyramid,
+    min_radius: float,
+    max_radius: float,
+    polarities: Sequence[int],
+    explained: Sequence[np.ndarray] | np.ndarray = (),
+) -> Dots:
+    """Return the `small_dots` of an image, which detectors may share."""
+    if min_radius >= LARGEST:
+        return NO_DOTS
+    search = partial(small_dots, pyramid.logs[0], log_scale=LOG_SCALE)
+    kind = min_radius, min(max_radius, LARGEST), polarities, explained
+    return dots_in_common(pyramid.common, BLOBS, search, *kind, smaller=BLURRED)
 
 
 def small_dots(
@@ -117,11 +142,12 @@ def _connected(
         extent = stats[:, cv2.CC_STAT_WIDTH : cv2.CC_STAT_HEIGHT + 1].max(axis=1)
         small = (extent <= longest) & (stats[:, cv2.CC_STAT_AREA] >= _MINIMUM_PIXELS)
         small[0] = False
-        pixels = cv2.findNonZero(small.view(np.uint8).take(labels))
-        if pixels is None:
+        if not mask.any():
             continue
-        x, y = pixels.reshape(-1, 2).T
-        order = np.argsort(labels[y, x], kind='stable')
+        x, y = cv2.findNonZero(mask).reshape(-1, 2).T
+        label = labels[y, x]
+        of_small = np.flatnonzero(small.take(label))
+        order = of_small[np.argsort(label[of_small], kind='stable')]
         found.append((x[order] + left, y[order] + top, stats[small, cv2.CC_STAT_AREA]))
     x, y, size = (np.concatenate(column) for column in zip(*found, strict=True))
     return x, y, size

@@ -77,6 +77,14 @@ def test_oblique_views_under_stripes_and_lattices(light):
     assert figures.right >= 11
 
 
+@pytest.mark.parametrize(('light', 'enough'), [('normal', 20), ('stripe', 16)])
+def test_small_oblique_targets(light, enough):
+    view = SceneSettings(width=1100, height=800, targets=20, dot_radius=7.0, tilt=60.0, seed=11)
+    figures = scored(rendered(replace(view, focal_length=3.0, light=light, ambient=0.3)))
+    assert (figures.wrong, figures.false_positives) == (0, 0)
+    assert figures.right >= enough
+
+
 def test_ellipse_and_code_are_those_of_the_target():
     scene = rendered(SMALL)
     for target, true in zip(identified(scene.image), scene.targets, strict=True):

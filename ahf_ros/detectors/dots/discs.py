@@ -16,14 +16,14 @@ import numpy as np
 
 from ahf_ros.codes.dots import DotFamily
 from ahf_ros.detectors.contract import DetectorSettings
-from ahf_ros.features.common_search import BLOBS, dots_in_common
+from ahf_ros.features.common_search import BLOBS
 from ahf_ros.features.dot_search import voted_dots, whole_dots
 from ahf_ros.features.dots import NO_DOTS, Dots, distinct
 from ahf_ros.features.frame import circle_outlines, circle_points, ellipse_axes, enlarged, scaled
 from ahf_ros.features.log_edges import LOG_SCALE, LogEdges, mask_of
 from ahf_ros.features.pyramid import ImagePyramid
 from ahf_ros.features.sampling import sample
-from ahf_ros.features.small_dots import small_dots
+from ahf_ros.features.small_dots import BLURRED, LARGEST, small_dots, small_dots_in
 
 _STRAIGHT = 8.0  # length of an edge that is no small dot's, px of the image at half its size
 _TILE = 64  # side, px of the image at half its size
@@ -33,8 +33,6 @@ _MAXIMUM_SHARE = 0.7  # share of the image, beyond which all of it is one region
 _SCALES = np.geomspace(0.76, 1.32, 11)  # of the radius of a disc, in radii of its candidate
 _MINIMUM_SHARE = 0.55  # of the steps of ln at disc and border; lattices of light reach 0.54
 _MARGIN = 0.3  # about the border of a known target, disc radii
-_SMALL = 12.0  # largest radius of discs that are looked for as blobs of the whole image, px
-_SMALLER = 0.8  # of the smallest radius, of a blob whose edge is blurred
 _TOLERANCE = 0.9  # the same, of a disc whose border has a whole outline
 
 _RAYS = 20
@@ -123,21 +121,20 @@ def _blobs(
     found = []
     for level in (0, 1):
         scale = 2**level
-        smallest, largest = _SMALLER * low / scale, min(high / scale, _SMALL)
+        smallest, largest = BLURRED * low / scale, min(high / scale, LARGEST)
         if smallest > largest:
             continue
         rows, columns = (slice(2 * it.start // scale, 2 * it.stop // scale) for it in region)
-        kind = smallest, largest, settings.polarities
         common = None if level else pyramid.common
         if common and BLOBS in common.found:  # in the whole image
-            blobs = dots_in_common(common, BLOBS, small_dots, *kind)
+            blobs = small_dots_in(pyramid, low, high, settings.polarities)
             x, y = blobs.frames[:, :2, 2].T
             within = (x >= columns.start) & (x < columns.stop)
             within &= (y >= rows.start) & (y < rows.stop)
             found.append(blobs.select(within))
         else:
             log = np.ascontiguousarray(pyramid.logs[level][rows, columns])
-            blobs = small_dots(log, *kind, LOG_SCALE)
+            blobs = small_dots(log, smallest, largest, settings.polarities, LOG_SCALE)
             frames = blobs.frames.copy()
             frames[:, :2, 2] += (columns.start, rows.start)
             found.append(replace(blobs, frames=enlarged(frames, level)))

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import Any, ClassVar
 
 import cv2
@@ -40,22 +39,18 @@ from ahf_ros.detectors.gsi.refinement import (
     resized,
 )
 from ahf_ros.features import frame
-from ahf_ros.features.common_search import BLOBS, dots_in_common
 from ahf_ros.features.dot_search import voted_dots, whole_dots
 from ahf_ros.features.dots import Dots, distinct
 from ahf_ros.features.ellipse_targets import ellipse_fields, targets_from_frames
 from ahf_ros.features.homography import local_frames
 from ahf_ros.features.large_targets import targets_of_octaves
-from ahf_ros.features.log_edges import LOG_SCALE
 from ahf_ros.features.pyramid import ImagePyramid, Octave, image_pyramid
-from ahf_ros.features.small_dots import small_dots
+from ahf_ros.features.small_dots import small_dots_in
 from ahf_ros.imaging.image import as_gray, check_image
 from ahf_ros.target import UNDECODED, DottedTarget, Target, sorted_targets
 
 _MARGIN = 0.5  # about the dots of certain targets, dot radii
 _WHOLE_MARGIN = 0.4  # about a dot whose outline is whole, dot radii
-_SMALL = 12.0  # radius up to which dots are looked for as blobs, px
-_SMALLER = 0.8  # of the smallest radius, of a blob whose edge is blurred
 _PROMISING = 0.85  # support of a hypothesis with another code than before, to be placed again
 _MAXIMUM_MOVE = 1.0  # that the reference point is moved by a refinement, px, or dot radii
 
@@ -149,15 +144,9 @@ def _with_others(
 ) -> Dots:
     """Return dots with a whole outline, and those without one outside of explained outlines."""
     outlines = frame.circle_outlines(whole.frames, np.full(len(whole.frames), 1 + _WHOLE_MARGIN))
-    minimum, maximum = settings.radii
-    known = [*outlines, *explained]
-    found = [whole, voted_dots(pyramid, minimum, maximum, settings.polarities, explained=known)]
-    if minimum < _SMALL:
-        radii = _SMALLER * minimum, min(maximum, _SMALL)
-        search = partial(small_dots, pyramid.logs[0], log_scale=LOG_SCALE)
-        kind = (*radii, settings.polarities, explained)
-        found.append(dots_in_common(pyramid.common, BLOBS, search, *kind))
-    return distinct(Dots.joined(found))
+    kind = (*settings.radii, settings.polarities)
+    voted = voted_dots(pyramid, *kind, explained=[*outlines, *explained])
+    return distinct(Dots.joined([whole, voted, small_dots_in(pyramid, *kind, explained)]))
 
 
 def read_targets(

@@ -23,9 +23,11 @@ from ahf_ros.detectors.ring.polar import DOT, MARGIN, PART, PolarImages, polar_i
 from ahf_ros.features import frame
 from ahf_ros.features.circle_fit import ENOUGH, NO_FITS, Fit, fit_dots
 from ahf_ros.features.dot_search import voted_dots, whole_dots
-from ahf_ros.features.dots import Dots
+from ahf_ros.features.dots import NO_DOTS, Dots
 from ahf_ros.features.pyramid import Octave
+from ahf_ros.features.small_dots import small_dots_in
 
+_THIN = 4.0  # semi-minor axis of a dot whose gap edges of a half may not show, px
 _NARROW = 3.0  # width of a gap, px, that edges of a half do not show on both of its sides
 _PER_SECTOR, _CIRCLES = 5, 36  # angles of the shortest sectors, and circles
 _PHASES = 4  # of the sectors
@@ -57,7 +59,16 @@ def propose_voted(octave: Octave, polarities: Sequence[int], explained: Explaine
     return voted_dots(octave.pyramid, *octave.radii, polarities, explained=outlines)
 
 
-PROPOSALS: tuple[Proposal, ...] = (propose_whole, propose_voted)
+def propose_small(octave: Octave, polarities: Sequence[int], explained: Explained) -> Dots:
+    """Return the small dots of the image in even light whose gap is too narrow for edges."""
+    if octave.level:
+        return NO_DOTS
+    outlines = explained.outlines_in(octave.level)
+    dots = small_dots_in(octave.pyramid, *octave.radii, polarities, outlines)
+    return dots.select(frame.ellipse_axes(dots.frames)[1] < _THIN)
+
+
+PROPOSALS: tuple[Proposal, ...] = (propose_whole, propose_voted, propose_small)
 """The ways to propose dots, the fastest first."""
 
 
