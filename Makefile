@@ -72,10 +72,11 @@ browser:
 SHARED = --ignore test/benchmarks --ignore test/bag --ignore test/batch --ignore test/cli
 
 # The oldest versions of numpy and OpenCV that are to be had, and no ROS. No vector units beyond
-# those that both were compiled for: other last bits than those of the tests above.
+# those that both were compiled for: other last bits than those of the tests above. What lasts long
+# is tested with the newest versions only.
 test-oldest: $(OLDEST)/ready
 	$(OLDEST)/bin/python -m support.vector_units baseline $(OLDEST)/bin/python -m pytest \
-		$(SHARED)
+		-m 'not lasting' $(SHARED)
 
 # What the oldest OpenCV does not have, without those vector units.
 test-portable: $(READY)
@@ -83,11 +84,10 @@ test-portable: $(READY)
 		test/detectors/test_square.py test/detectors/test_sides.py
 
 # What talks to ROS 2, on Kilted; what lasts long does so on Jazzy only.
-LASTING = test_benchmark_soak|test_demo|test_every_way|test_nodes_robust|test_package
 test-kilted:
 	$(MAKE) DISTRIBUTION=kilted .venv-kilted/ready
-	.venv-kilted/bin/python -m pytest \
-		$$(grep -lrE 'rclpy|graph: ' test --include='test_*.py' | grep -vE '$(LASTING)')
+	.venv-kilted/bin/python -m pytest -m 'not lasting' \
+		$$(grep -lrE 'rclpy|graph: ' test --include='test_*.py')
 
 # With ROS 2 from PyPI; where one is sourced, run the script itself.
 test-colcon:

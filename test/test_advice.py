@@ -17,6 +17,8 @@ from ahf_ros.synthetic.scene import SceneSettings
 from support.command_line import status
 from support.scenes import rendered
 
+pytestmark = pytest.mark.lasting
+
 SCENE = SceneSettings(width=800, height=600, targets=12, dot_radius=9, seed=3)
 
 

@@ -11,6 +11,8 @@ import pytest
 
 from support import ROOT
 
+pytestmark = pytest.mark.lasting
+
 TOP = ('README.md', 'CONTRIBUTING.md', 'QUALITY_DECLARATION.md')
 PAGES = [*(ROOT / name for name in TOP), *sorted((ROOT / 'docs').rglob('*.md'))]
 ROOTS = (ROOT, ROOT / 'ahf_ros')

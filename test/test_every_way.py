@@ -29,6 +29,8 @@ from support import bags
 from support.packages import MINE, my_detector, write_package
 from support.square_markers import needs_square_markers
 
+pytestmark = pytest.mark.lasting
+
 SCENE = {'width': 320, 'height': 240, 'targets': 3, 'dot_radius': 9.0}
 SCENES = {
     'gsi': SCENE | {'width': 560, 'height': 420, 'dot_radius': 5.0},

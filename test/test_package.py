@@ -21,6 +21,8 @@ import pytest
 from support import ROOT
 from support.command_line import python
 
+pytestmark = pytest.mark.lasting
+
 PACKAGE = ROOT / 'ahf_ros'
 MODULES = {
     '.'.join(file.relative_to(ROOT).with_suffix('').parts): file for file in PACKAGE.rglob('*.py')

@@ -32,6 +32,8 @@ from ahf_ros import (
 from support import ROOT
 from support.command_line import python
 
+pytestmark = pytest.mark.lasting
+
 OBJECTS = [name for name in ahf_ros.__all__ if not name.isupper()]
 
 

@@ -15,6 +15,8 @@ from ahf_ros.interchange.files import checked_file_name
 from support import ROOT, packages
 from support.command_line import python, status
 
+pytestmark = pytest.mark.lasting
+
 WITHOUT_POSIX = """
 import multiprocessing, os, select, signal, sys
 

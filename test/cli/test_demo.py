@@ -14,6 +14,8 @@ from ahf_ros.interchange.image_files import read_image
 from ahf_ros.target import FilterState, Identification, Target
 from support.command_line import status
 
+pytestmark = pytest.mark.lasting
+
 GRAY = np.full((240, 320), 120, np.uint8)
 
 

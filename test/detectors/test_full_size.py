@@ -13,6 +13,8 @@ from support.collage import Collage, collage
 from support.scenes import counts, identified
 from support.square_markers import needs_square_markers
 
+pytestmark = pytest.mark.lasting
+
 MAXIMUM_ERROR = 0.05
 """Of a centre of any size, px."""
 

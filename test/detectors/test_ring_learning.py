@@ -96,6 +96,7 @@ def drawn(bits: int, count: int, seed: int, **rules: object) -> np.ndarray:
     return np.random.default_rng(seed).permutation(every)[:count]
 
 
+@pytest.mark.lasting
 def test_probabilities_of_rules_are_the_shares_of_right_ones() -> None:
     choices = [{'parity': 'even', 'opposite_pairs': 1}] * 2 + [{'parity': 'even'}] * 3
     said, right = [], []

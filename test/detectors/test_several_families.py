@@ -21,6 +21,8 @@ from benchmarks.sheets import mark_sheet
 from support.ring import measured
 from support.scenes import identified, rendered
 
+pytestmark = pytest.mark.lasting
+
 TWO = ('metashape12', 'aicon14')
 THREE = ('metashape12', 'metashape20', 'aicon14')
 LIGHTS = ('normal', 'stripe')

@@ -28,6 +28,8 @@ from support.command_line import status
 from support.scenes import rendered
 from support.square_markers import needs_square_markers
 
+pytestmark = pytest.mark.lasting
+
 if needs_square_markers.args[0]:
     pytest.skip(needs_square_markers.kwargs['reason'], allow_module_level=True)
 

@@ -32,6 +32,7 @@ def shifted(image: np.ndarray, x: float, y: float) -> np.ndarray:
 LIGHTS = [('normal', 0.3), ('stripe', 0.02), ('lattice', 0.3), ('fringe', 0.3), ('shadow', 0.3)]
 
 
+@pytest.mark.lasting
 @pytest.mark.parametrize(('light', 'ambient'), LIGHTS)
 def test_light_that_moves_is_no_movement_and_a_scene_that_moves_is(light, ambient):
     first, *others = images(light, ambient)

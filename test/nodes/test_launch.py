@@ -255,6 +255,7 @@ def test_best_effort_is_for_the_topics_that_are_read(given: dict[str, str], word
     assert f"{words}:='best_effort'" in detector.arguments
 
 
+@pytest.mark.lasting
 def test_the_nodes_of_the_demo_work_together(graph: Any) -> None:
     result = launched('demo', light='lattice')
     assert all(Path(file).is_file() for file in result.environment.values())

@@ -358,6 +358,7 @@ def test_a_refused_parameter_stops_a_node_at_the_start(
     assert all(word in errors for word in words), errors
 
 
+@pytest.mark.lasting
 def test_a_service_is_a_detector_and_its_end_is_named(
     graph: Any, message: Image, rendering: Rendering
 ) -> None:

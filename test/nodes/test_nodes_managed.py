@@ -32,6 +32,7 @@ def change(graph: Any, node: str, transition: int) -> bool:
     return graph.call(ChangeState, f'{node}/change_state', request).success
 
 
+@pytest.mark.lasting
 def test_a_managed_node_goes_through_its_states(graph: Any) -> None:
     node, topic = '/managed/detector', '/managed/image'
     graph.start('detector', '-r', '__ns:=/auto', *overrides(managed='true', autostart='true'))

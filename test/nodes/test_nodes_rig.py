@@ -259,6 +259,7 @@ def test_without_the_parameter_there_are_no_clouds(rig: Rig) -> None:
     assert rig.found(image.header).width == SCENE.targets
 
 
+@pytest.mark.lasting
 def test_cameras_in_namespaces_know_nothing_of_each_other(graph: Any) -> None:
     scenes = {
         'left': render(replace(SCENE, seed=5, tilt=0.0)),

@@ -32,6 +32,8 @@ from support import live
 from support.detector import DetectorProcess, overrides
 from support.hostile import IMAGES, Fields
 
+pytestmark = pytest.mark.lasting
+
 SCENE = {'width': 320, 'height': 240, 'targets': 3, 'dot_radius': 9.0}
 
 

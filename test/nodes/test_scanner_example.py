@@ -26,6 +26,8 @@ from support.launch_files import launched
 from support.live import Graph
 from support.scans import squared_error
 
+pytestmark = pytest.mark.lasting
+
 EXAMPLE = ROOT / 'docs' / 'examples' / 'scanner.py'
 SCANNER = runpy.run_path(str(EXAMPLE))
 SCANS = range(len(SCANNER['SEEDS']))

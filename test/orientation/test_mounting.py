@@ -54,6 +54,7 @@ def simulated(
     return stations
 
 
+@pytest.mark.lasting
 @pytest.mark.parametrize('targets_on_hand', [False, True])
 @pytest.mark.parametrize('scale', [None, 1e-3])
 def test_covariances_are_those_of_the_errors(targets_on_hand: bool, scale: float | None) -> None:

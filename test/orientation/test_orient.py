@@ -83,6 +83,7 @@ def test_nothing_but_ids_orients_a_network(depth: float, focal: float | None):
     assert 0.8 < solution.sigma0 < 1.2
 
 
+@pytest.mark.lasting
 @pytest.mark.parametrize('k1', [-0.3, 0.1])
 def test_a_lens_with_distortion_that_nobody_gave(k1: float):
     seen = taken(count=5, lens={'k1': k1, 'cx': 50.0, 'cy': -40.0})
@@ -91,6 +92,7 @@ def test_a_lens_with_distortion_that_nobody_gave(k1: float):
     assert error(solution, seen.points) < 2e-3
 
 
+@pytest.mark.lasting
 def test_half_of_the_photographs_of_the_panel():
     """Its lens displaces image points by up to 40 px; true lengths are those of a scale bar."""
     every = read_observations(ROOT / 'docs' / 'examples' / 'panel.csv')
@@ -158,6 +160,7 @@ def of_few(number: int, changed: int | None = None) -> Network:
     return replace(network, observations=replace(observed, point=point).rows(kept))
 
 
+@pytest.mark.lasting
 def test_four_targets_orient_a_photograph_if_they_agree():
     (solution,) = orient(of_few(4))
     assert solution.oriented.all() and not any('not oriented' in it for it in solution.warnings)
@@ -171,6 +174,7 @@ def test_four_targets_orient_a_photograph_if_they_agree():
         assert any('4.png' in it and reason in it for it in solution.warnings)
 
 
+@pytest.mark.lasting
 def test_groups_that_do_not_hang_together_are_oriented_each_by_itself():
     seen = taken(count=8, focal=FOCAL)
     observed = seen.network.observations
@@ -183,6 +187,7 @@ def test_groups_that_do_not_hang_together_are_oriented_each_by_itself():
     assert np.array_equal(posed[0], ~posed[1])
 
 
+@pytest.mark.lasting
 def test_portrait_and_landscape_are_two_cameras():
     rotations, positions = ring(8, 35)
     cameras = CameraView('landscape', 3000, 2000), CameraView('portrait', 2000, 3000)
@@ -196,6 +201,7 @@ def test_portrait_and_landscape_are_two_cameras():
     assert solution.start.calibrations[:, 0] == pytest.approx(FOCAL, rel=5e-3)
 
 
+@pytest.mark.lasting
 def test_another_zoom_in_one_camera_is_said():
     rotations, positions = ring(6, 35)
     calibrations = np.stack(
@@ -209,6 +215,7 @@ def test_another_zoom_in_one_camera_is_said():
     assert error(solution, points) < 1e-3
 
 
+@pytest.mark.lasting
 @pytest.mark.parametrize('depth', [0.0, 0.3])
 def test_parallel_photographs_do_not_tell_the_focal_length(depth: float):
     rotations = [looking(np.array([0, 0, -1.0]), 0)] * 4

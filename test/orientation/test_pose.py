@@ -39,6 +39,7 @@ def located(of: View, **changes: Any) -> Any:
     return resect(**given)
 
 
+@pytest.mark.lasting
 @pytest.mark.parametrize(('width', 'depth'), [(1.0, 0.0), (1.0, 0.2), (0.1, 0.0)])
 def test_errors_are_as_large_as_covariances_say(width: float, depth: float) -> None:
     counts = run(width, depth, seed=11, runs=100)
