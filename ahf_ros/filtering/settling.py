@@ -1,7 +1,7 @@
 """Which families of targets images show, settled on the first of them.
 
 All families are looked for in the first images, as received. From then on only those that were
-found are looked for, and all again in an image that shows none of these.
+found are looked for, and all again in an image that does not clearly show one of these.
 """
 
 from __future__ import annotations
@@ -26,6 +26,7 @@ FIRST = 3
 
 _OF_ONE = 2.99  # decimal logarithm of the odds on a family: one target certain to 0.999
 _OF_SEVERAL = 3.9  # ... of all together: three certain to 0.95, or two to 0.989
+_OF_KNOWN = 1.99  # ... on families that other images have settled: one certain to 0.99
 _DOUBTFUL = 0.9  # confidence up to which words are read in nearly any texture
 _CERTAIN = 1e-3  # probability that a target is wrong, below which it counts for no more
 
@@ -43,6 +44,24 @@ def evident(targets: Sequence[Target]) -> list[Target]:
     evidence, or three to 0.95. What is read in several places, as letters may
     be, counts once.
     """
+    shown = {
+        family
+        for family, of in _evidence(targets).items()
+        if max(of) > _OF_ONE or sum(of) > _OF_SEVERAL
+    }
+    return [it for it in targets if it.id == UNDECODED or it.family in shown]
+
+
+def still_shown(targets: Sequence[Target]) -> bool:
+    """Return whether an image shows families that other images have settled.
+
+    A doubtful word may be read in a target of another family.
+    """
+    return any(sum(of) > _OF_KNOWN for of in _evidence(targets).values())
+
+
+def _evidence(targets: Sequence[Target]) -> dict[str, list[float]]:
+    """Return the decimal logarithms of the odds that targets are right, by family."""
     surest: defaultdict[tuple[str, int], float] = defaultdict(float)
     for target in targets:
         surest[target.key] = max(surest[target.key], target.confidence)
@@ -50,10 +69,7 @@ def evident(targets: Sequence[Target]) -> list[Target]:
     for (family, _), confidence in surest.items():
         if confidence > _DOUBTFUL:
             evidence[family].append(-math.log10(max(1 - confidence, _CERTAIN)))
-    shown = {
-        family for family, of in evidence.items() if max(of) > _OF_ONE or sum(of) > _OF_SEVERAL
-    }
-    return [it for it in targets if it.id == UNDECODED or it.family in shown]
+    return evidence
 
 
 def _families(targets: Iterable[Target]) -> set[str]:
@@ -114,7 +130,7 @@ class SettlingIdentifier(Identifier):
         known, found = self.memory.families, None
         if self.memory.shown >= FIRST:
             found = self._read(stack, known, expected_targets)
-        if not (found and found.count):
+        if not (found and still_shown(found.targets)):
             families = self._ordered({*known, *self._look(stack)})
             if not families:
                 found = super().identify(stack, expected_targets=expected_targets)

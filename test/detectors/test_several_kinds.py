@@ -17,7 +17,7 @@ from ahf_ros.batch.settling import settled_tasks
 from ahf_ros.batch.task import ImageTask
 from ahf_ros.detectors import DetectorSettings, Narrowing, check_expected_ids, create_detector
 from ahf_ros.filtering.identifier import Memory
-from ahf_ros.filtering.settling import evident, settled_families
+from ahf_ros.filtering.settling import evident, settled_families, still_shown
 from ahf_ros.imaging.stack import ImageStack
 from ahf_ros.interchange.image_files import write_image
 from ahf_ros.session import create_identifier
@@ -126,6 +126,20 @@ def test_doubtful_targets_of_few_are_no_evidence_for_a_family() -> None:
     sure = [target('aicon12', 5, 0.9995), *(target('cct12', it, 0.95) for it in range(3))]
     undecoded = target('', -1, 0.5)
     assert evident([*doubtful, *sure, undecoded]) == [*sure, undecoded]
+
+
+@pytest.mark.parametrize(
+    ('confidences', 'shown'),
+    [((), False), ((0.94,), False), ((0.8, 0.89), False), ((0.995,), True), ((0.94, 0.95), True)],
+)
+def test_doubtful_targets_alone_do_not_show_a_family(
+    confidences: tuple[float, ...], shown: bool
+) -> None:
+    targets = [
+        Target(number, 0, 9.0, 9.0, 5.0, 5.0, 0.0, confidence, family='aicon14')
+        for number, confidence in enumerate(confidences, start=1)
+    ]
+    assert still_shown(targets) == shown
 
 
 def test_families_are_settled_on_the_first_images_and_where_none_is_shown() -> None:
