@@ -1,6 +1,6 @@
 """Each built-in family, read as named and among all families as `auto`, under every light.
 
-    python -m benchmarks.auto [--seeds 301] [--families gsi dots ...] [--lights normal stripe ...]
+    python -m benchmarks.auto [--seeds 301] [--targets 12] [--families gsi dots ...] [--lights ...]
 
 A row is a family under one light. Each image is the first one that `auto` sees.
 """
@@ -40,14 +40,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     made.add_argument('--targets', type=int, default=12, help='of a scene')
     options = report.parsed(made, arguments)
     lights = [of for of in benchmark_lights() if of[0] in options.lights]
-    rows = []
+    spacious, rows = max(1.0, (options.targets / 12) ** 0.5), []
     print(*report.table(('', 'light', 'named', AUTO, 'apart (px)'), ()), sep='\n', flush=True)
     for name, (light, ambient) in report.progress([*product(options.families, lights)], 'scenes'):
         counts, apart = [], 0.0
         for seed in options.seeds:
             settings = SceneSettings(
-                width=1400,
-                height=1000,
+                width=round(1400 * spacious),
+                height=round(1000 * spacious),
                 targets=options.targets,
                 dot_radius=RADII.get(kind_of(name), 12.0),
                 family=name,

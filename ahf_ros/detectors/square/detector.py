@@ -8,17 +8,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import ceil, isnan, log2
+from math import ceil, inf, isnan, log, log2
 from typing import Any
 
 import numpy as np
 
 from ahf_ros.blas import one_blas_thread
 from ahf_ros.codes.square import words
+from ahf_ros.detectors.claims import Rivals, owners
 from ahf_ros.detectors.contract import FamilyDetector, moved_targets
 from ahf_ros.detectors.square.prints import lay_outlines, lay_prints
 from ahf_ros.detectors.square.quadrilaterals import find_quadrilaterals
-from ahf_ros.detectors.square.reading import read
+from ahf_ros.detectors.square.reading import MINIMUM_ODDS, read
 from ahf_ros.detectors.square.sides import USED, centres, fit_sides
 from ahf_ros.features.frame import reduced
 from ahf_ros.features.pyramid import halved
@@ -29,6 +30,7 @@ _DRAFT_DEVIATION = 0.3  # standard deviation of a centre from corners of contour
 _SMALL = 28.0  # diagonal of a marker whose cells are not much larger than pixels, px
 _SMALLEST_HALF = 24  # smaller side of a half that markers are looked for in, px
 _SAME_PLACE = 0.3  # distance of two readings of one marker, in sides
+_SEVERAL = 4.0  # power of their number, one in which each of several groups is there
 _LARGE = 120.0  # side of a marker whose contour gives its corners to about two pixels, px
 
 Groups = tuple[tuple[str, ...], ...]
@@ -82,10 +84,13 @@ class SquareDetector(FamilyDetector):
             columns = (read_as.group, read_as.number, read_as.border, read_as.odds)
             readings.append(np.stack(columns, axis=1))
         places, rows = np.concatenate(corners), np.concatenate(readings)
-        chosen = _best(places, rows[:, 3])
+        odds = _odds_together(rows, _one_place(places), len(groups))
+        order = np.argsort(-odds, kind='stable')
+        owning = owners(len(order), _one_place(places[order]))
+        chosen = order[owning & (odds[order] > MINIMUM_ODDS)]
         if not len(chosen):
             return []
-        which, numbers, borders, odds = rows[chosen].T
+        which, numbers, borders, _ = rows[chosen].T
         families = [
             next(name for name in group if len(words(name)) > numbers[which == index].max())
             if index in which
@@ -93,7 +98,7 @@ class SquareDetector(FamilyDetector):
             for index, group in enumerate(groups)
         ]
         covariances = np.tile(_DRAFT_DEVIATION**2 * np.eye(2), (len(chosen), 1, 1))
-        confidences = 1 / (1 + np.exp(-odds))
+        confidences = 1 / (1 + np.exp(-odds[chosen]))
         fields = _places(places[chosen], covariances, np.full(len(chosen), np.nan))
         return sorted_targets(
             SquareMarker(
@@ -137,16 +142,38 @@ def _grid(marker: SquareMarker) -> tuple[int, int]:
     return words(marker.family).shape[1] + 2 * marker.border, marker.border
 
 
-def _best(corners: np.ndarray, odds: np.ndarray) -> list[int]:
-    """Return the indices of the readings, shape (k,), that no better one of their place beats."""
+def _odds_together(readings: np.ndarray, one_place: Rivals, groups: int) -> np.ndarray:
+    """Return the logarithmic odds of the readings, shape (k,), as all of them show the groups.
+
+    A group is there or not, and different markers of it speak for it together, each by its lead
+    over other readings of its place.
+    """
+    group, number, _, odds = readings.T
+    lead = odds.copy()
+    for index in range(len(odds)):
+        others = (group != group[index]) | (number != number[index])
+        lead[index] -= odds[others & one_place(index)].max(initial=0.0)
+    against = np.full(len(odds), log(groups**_SEVERAL - 1) if groups > 1 else -inf)
+    for of in np.unique(group):
+        some = group == of
+        surest = np.zeros(int(number[some].max()) + 1)
+        np.maximum.at(surest, number[some].astype(int), lead[some])
+        against[some] -= surest.sum()
+    together: np.ndarray = -np.logaddexp(-odds, against)
+    return together
+
+
+def _one_place(corners: np.ndarray) -> Rivals:
+    """Return which of k readings, whose corners have the shape (k, 4, 2), have one place."""
     sizes = np.linalg.norm(corners - np.roll(corners, 2, axis=1), axis=2).max(axis=1)
     middles = corners.mean(axis=1)
-    chosen: list[int] = []
-    for index in np.argsort(-odds, kind='stable').tolist():
-        distances = np.linalg.norm(middles[chosen] - middles[index], axis=1)
-        if (distances > _SAME_PLACE * np.maximum(sizes[chosen], sizes[index])).all():
-            chosen.append(index)
-    return chosen
+
+    def near(index: int) -> np.ndarray:
+        distances = np.linalg.norm(middles - middles[index], axis=1)
+        some: np.ndarray = distances <= _SAME_PLACE * np.maximum(sizes, sizes[index])
+        return some
+
+    return near
 
 
 def _from_halves(gray: np.ndarray, corners: np.ndarray, cells: int, border: int) -> np.ndarray:
