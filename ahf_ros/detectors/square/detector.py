@@ -31,6 +31,7 @@ _SMALL = 28.0  # diagonal of a marker whose cells are not much larger than pixel
 _SMALLEST_HALF = 24  # smaller side of a half that markers are looked for in, px
 _SAME_PLACE = 0.3  # distance of two readings of one marker, in sides
 _SEVERAL = 4.0  # power of their number, one in which each of several groups is there
+_LARGER = 6.9  # logarithmic odds against a larger dictionary where most markers are of a smaller
 _LARGE = 120.0  # side of a marker whose contour gives its corners to about two pixels, px
 
 Groups = tuple[tuple[str, ...], ...]
@@ -84,7 +85,7 @@ class SquareDetector(FamilyDetector):
             columns = (read_as.group, read_as.number, read_as.border, read_as.odds)
             readings.append(np.stack(columns, axis=1))
         places, rows = np.concatenate(corners), np.concatenate(readings)
-        odds = _odds_together(rows, _one_place(places), len(groups))
+        odds = _odds_together(rows, _one_place(places), groups)
         order = np.argsort(-odds, kind='stable')
         owning = owners(len(order), _one_place(places[order]))
         chosen = order[owning & (odds[order] > MINIMUM_ODDS)]
@@ -142,25 +143,32 @@ def _grid(marker: SquareMarker) -> tuple[int, int]:
     return words(marker.family).shape[1] + 2 * marker.border, marker.border
 
 
-def _odds_together(readings: np.ndarray, one_place: Rivals, groups: int) -> np.ndarray:
+def _odds_together(readings: np.ndarray, one_place: Rivals, groups: Groups) -> np.ndarray:
     """Return the logarithmic odds of the readings, shape (k,), as all of them show the groups.
 
     A group is there or not, and different markers of it speak for it together, each by its lead
-    over other readings of its place.
+    over other readings of its place. So do those that a smaller dictionary does not have for a
+    larger one.
     """
     group, number, _, odds = readings.T
     lead = odds.copy()
     for index in range(len(odds)):
         others = (group != group[index]) | (number != number[index])
         lead[index] -= odds[others & one_place(index)].max(initial=0.0)
-    against = np.full(len(odds), log(groups**_SEVERAL - 1) if groups > 1 else -inf)
-    for of in np.unique(group):
-        some = group == of
-        surest = np.zeros(int(number[some].max()) + 1)
-        np.maximum.at(surest, number[some].astype(int), lead[some])
-        against[some] -= surest.sum()
-    together: np.ndarray = -np.logaddexp(-odds, against)
-    return together
+    doubt = log(len(groups) ** _SEVERAL - 1) if len(groups) > 1 else -inf
+    against = np.full(len(odds), inf)
+    for index, names in enumerate(groups):
+        sizes = np.array([len(words(name)) for name in names])
+        of_group, numbers = group == index, number.astype(int)
+        surest = np.zeros(sizes[-1])
+        np.maximum.at(surest, numbers[of_group], lead[of_group])
+        together, shown = np.cumsum(surest)[sizes - 1], np.cumsum(surest > 0)[sizes - 1]
+        by_chance = np.minimum(shown[:-1] * np.diff(np.log(sizes)), _LARGER)
+        likeliest = np.argmax(together - np.cumsum([0.0, *by_chance]))
+        some = of_group & (number < sizes[likeliest])
+        against[some] = doubt - together[likeliest]
+    of_image: np.ndarray = -np.logaddexp(-odds, against)
+    return of_image
 
 
 def _one_place(corners: np.ndarray) -> Rivals:
