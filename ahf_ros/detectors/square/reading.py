@@ -55,7 +55,8 @@ class Readings:
     number: np.ndarray  # ID
     turn: np.ndarray  # index of the corner that is top left in the upright marker
     border: np.ndarray  # width of the border, cells
-    odds: np.ndarray  # logarithmic, that it is this marker, if the group is there
+    odds: np.ndarray  # logarithmic, that it is a marker of the group, if the group is there
+    others: np.ndarray  # logarithmic odds of other markers of the group against this one
 
 
 def read(gray: np.ndarray, corners: np.ndarray, groups: Sequence[Sequence[str]]) -> Readings:
@@ -63,7 +64,7 @@ def read(gray: np.ndarray, corners: np.ndarray, groups: Sequence[Sequence[str]])
 
     A group has dictionaries that begin with the same markers, the smallest first.
     """
-    found = [np.zeros((0, 6))]
+    found = [np.zeros((0, 7))]
     frames = square_frames(corners)
     bordered = np.flatnonzero(_dark_inside(gray, frames, _DEPTH))
     sizes = np.sqrt([cv2.contourArea(of.astype(np.float32)) for of in corners])
@@ -89,19 +90,16 @@ def read(gray: np.ndarray, corners: np.ndarray, groups: Sequence[Sequence[str]])
             total = odds[np.arange(len(best)), best] + against - _DOUBT - plain[best]
             likely = np.flatnonzero(total > MINIMUM_ODDS)
             odds, best, total = odds[likely], best[likely], total[likely]
-            # Against another marker of the group, and against none of them. A turn of the same
-            # one is no other: some are symmetric.
+            # A turn of the same marker is no other: some are symmetric.
             number, turn = np.divmod(best, 4)
             rows = np.arange(len(best))[:, None]
             odds -= odds[rows, best[:, None]]
             odds[rows, 4 * number[:, None] + np.arange(4)] = -np.inf
             second = odds.max(axis=1, initial=-np.inf)
             others = second + np.log(np.exp(odds - second[:, None]).sum(axis=1))
-            total = -np.logaddexp(-total, others)
-            good = total > MINIMUM_ODDS
             alike = np.full((2, len(best)), [[index], [border]])
-            columns = (which[likely], alike[0], number, turn, alike[1], total)
-            found.append(np.stack(columns, axis=1)[good])
+            columns = (which[likely], alike[0], number, turn, alike[1], total, others)
+            found.append(np.stack(columns, axis=1))
     table = np.concatenate(found)
     which, group, number, turn, widths = table[:, :5].T.astype(int)
     return Readings(
@@ -111,6 +109,7 @@ def read(gray: np.ndarray, corners: np.ndarray, groups: Sequence[Sequence[str]])
         turn=turn,
         border=widths,
         odds=table[:, 5],
+        others=table[:, 6],
     )
 
 
