@@ -95,8 +95,9 @@ def _lines(image: np.ndarray, settings: DetectorSettings, expected: int) -> Iter
         yield from _of_bands(learnt, 1, settings, expected)
         return
     usual = replace(settings, family=AUTO, polarity='auto', min_radius=0.0, max_radius=1e4)
-    found = evident(_identified(image, usual))
-    if found := [it for it in found if it.family not in settings.families]:
+    others = set(usual.families) - set(settings.families)
+    found = evident(_identified(image, usual)) if others else []
+    if found := [it for it in found if it.family in others]:
         ((name, count),) = Counter(target.family for target in found).most_common(1)
         yield f'{counted(count, "target")} of {name}: --family {name}'
         yield edge_shift_remark(median_edge_shift(found))

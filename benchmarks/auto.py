@@ -1,6 +1,6 @@
 """Each built-in family, read as named and among all families as `auto`, under every light.
 
-    python -m benchmarks.auto [--seeds 301] [--families gsi dots ...] [--lights normal stripe ...]
+    python -m benchmarks.auto [--seeds 301] [--targets 12] [--families gsi dots ...] [--lights ...]
 
 A row is a family under one light. Each image is the first one that `auto` sees.
 """
@@ -18,18 +18,21 @@ from ahf_ros.evaluation import score, total
 from ahf_ros.session import identify
 from ahf_ros.synthetic.patterns import LIGHT_NAMES, benchmark_lights
 from ahf_ros.synthetic.scene import SceneSettings, render
-from ahf_ros.target import Target, TrueTarget
+from ahf_ros.target import Target
 from benchmarks import report
 
 RADII = {'gsi': 4.0, 'cctag': 24.0}
 """Of dots, px, of kinds for which 12 px is not usual; CCTags have no dot, but an outer circle."""
 
 
-def farthest(named: Sequence[Target | TrueTarget], found: Sequence[Target | TrueTarget]) -> float:
-    """Return the largest distance of the centres of targets that have one ID twice, px."""
-    places = {target.id: (target.x, target.y) for target in named}
-    both = [(places[of.id], (of.x, of.y)) for of in found if of.id in places]
-    return max((float(np.hypot(*np.subtract(*pair))) for pair in both), default=0.0)
+def farthest(named: Sequence[Target], found: Sequence[Target]) -> float:
+    """Return the largest distance of a target from the next that is named with its ID, px."""
+    nearest = [
+        min(np.hypot(it.x - of.x, it.y - of.y) for it in named if it.id == of.id)
+        for of in found
+        if of.id in {it.id for it in named}
+    ]
+    return float(max(nearest, default=0.0))
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -40,14 +43,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     made.add_argument('--targets', type=int, default=12, help='of a scene')
     options = report.parsed(made, arguments)
     lights = [of for of in benchmark_lights() if of[0] in options.lights]
-    rows = []
+    spacious, rows = max(1.0, (options.targets / 12) ** 0.5), []
     print(*report.table(('', 'light', 'named', AUTO, 'apart (px)'), ()), sep='\n', flush=True)
     for name, (light, ambient) in report.progress([*product(options.families, lights)], 'scenes'):
         counts, apart = [], 0.0
         for seed in options.seeds:
             settings = SceneSettings(
-                width=1400,
-                height=1000,
+                width=round(1400 * spacious),
+                height=round(1000 * spacious),
                 targets=options.targets,
                 dot_radius=RADII.get(kind_of(name), 12.0),
                 family=name,

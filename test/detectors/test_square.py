@@ -10,6 +10,7 @@ from ahf_ros.codes import SQUARE_NAMES
 from ahf_ros.codes.square import marker, words
 from ahf_ros.detectors import Detector, create_detector
 from ahf_ros.evaluation import score
+from ahf_ros.filtering.settling import evident
 from ahf_ros.session import identify
 from ahf_ros.synthetic.scene import Rendering
 from ahf_ros.target import Target
@@ -83,6 +84,30 @@ def test_markers_show_their_dictionary_together():
     found = create_detector(family=','.join(SQUARE_NAMES))(shown.image)
     assert 17 in {target.id for target in found}
     assert counted(shown, found) == (12, 0, 0)
+
+
+@pytest.mark.parametrize(('family', 'seed'), [('aruco_4x4_50', 3), ('aruco_4x4_250', 5)])
+def test_doubtful_markers_show_their_dictionary_together(family, seed):
+    """Under these stripes no marker is sure enough to be of one dictionary of many."""
+    size = {'width': 1400, 'height': 1000, 'targets': 12, 'dot_radius': 12.0}
+    shown = scene(family, **size, light='stripe', ambient=0.12, seed=seed)
+    found = create_detector(family=','.join(SQUARE_NAMES))(shown.image)
+    named = create_detector(family=family)(shown.image)
+    assert {it.family for it in found} == {family}
+    assert [it.id for it in found] == [it.id for it in named]
+    assert counted(shown, found) == (len(found), 0, 0)
+
+
+@pytest.mark.parametrize('family', ['aruco_4x4_50', 'apriltag_16h5', 'aruco_5x5_50'])
+def test_a_single_marker_shows_its_dictionary(family):
+    detect = create_detector(family=','.join(SQUARE_NAMES))
+    evidence = 0
+    for seed in range(1, 6):
+        shown = scene(family, width=400, height=300, targets=1, dot_radius=12.0, seed=seed)
+        (found,) = detect(shown.image)
+        assert (found.family, found.id) == (family, shown.targets[0].id)
+        evidence += len(evident([found]))
+    assert evidence >= 2  # some IDs are nearly those of other dictionaries
 
 
 def test_hardly_any_texture_is_a_marker():

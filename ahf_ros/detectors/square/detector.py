@@ -8,17 +8,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import ceil, isnan, log2
+from math import ceil, inf, isnan, log, log2
 from typing import Any
 
 import numpy as np
 
 from ahf_ros.blas import one_blas_thread
 from ahf_ros.codes.square import words
+from ahf_ros.detectors.claims import Rivals, owners
 from ahf_ros.detectors.contract import FamilyDetector, moved_targets
 from ahf_ros.detectors.square.prints import lay_outlines, lay_prints
 from ahf_ros.detectors.square.quadrilaterals import find_quadrilaterals
-from ahf_ros.detectors.square.reading import read
+from ahf_ros.detectors.square.reading import MINIMUM_ODDS, read
 from ahf_ros.detectors.square.sides import USED, centres, fit_sides
 from ahf_ros.features.frame import reduced
 from ahf_ros.features.pyramid import halved
@@ -29,6 +30,9 @@ _DRAFT_DEVIATION = 0.3  # standard deviation of a centre from corners of contour
 _SMALL = 28.0  # diagonal of a marker whose cells are not much larger than pixels, px
 _SMALLEST_HALF = 24  # smaller side of a half that markers are looked for in, px
 _SAME_PLACE = 0.3  # distance of two readings of one marker, in sides
+_ALONE = 2.9  # ... one marker alone shows
+_SEVERAL = 4.0  # power of their number, one in which each of several groups is there
+_LARGER = 6.9  # logarithmic odds against a larger dictionary where most markers are of a smaller
 _LARGE = 120.0  # side of a marker whose contour gives its corners to about two pixels, px
 
 Groups = tuple[tuple[str, ...], ...]
@@ -67,7 +71,7 @@ class SquareDetector(FamilyDetector):
         gray = np.ascontiguousarray(as_gray(image).astype(np.uint8, copy=False))
         groups = self.design
         levels = max(0, int(log2(max(min(gray.shape) / _SMALLEST_HALF, 1))))
-        corners, readings = [np.zeros((0, 4, 2))], [np.zeros((0, 4))]
+        corners, readings = [np.zeros((0, 4, 2))], [np.zeros((0, 5))]
         for level, half in enumerate(halved(gray, levels)):
             found = find_quadrilaterals(half)
             if not level:  # what is small in a half is large enough here
@@ -79,13 +83,16 @@ class SquareDetector(FamilyDetector):
                 for index, turn in zip(read_as.quadrilateral, read_as.turn, strict=True)
             ]
             corners.append((np.array(turned).reshape(-1, 4, 2) + 0.5) * 2**level - 0.5)
-            columns = (read_as.group, read_as.number, read_as.border, read_as.odds)
+            columns = (read_as.group, read_as.number, read_as.border, read_as.odds, read_as.others)
             readings.append(np.stack(columns, axis=1))
         places, rows = np.concatenate(corners), np.concatenate(readings)
-        chosen = _best(places, rows[:, 3])
+        odds = _odds_together(rows, _one_place(places), groups)
+        order = np.argsort(-odds, kind='stable')
+        owning = owners(len(order), _one_place(places[order]))
+        chosen = order[owning & (odds[order] > MINIMUM_ODDS)]
         if not len(chosen):
             return []
-        which, numbers, borders, odds = rows[chosen].T
+        which, numbers, borders, *_ = rows[chosen].T
         families = [
             next(name for name in group if len(words(name)) > numbers[which == index].max())
             if index in which
@@ -93,7 +100,7 @@ class SquareDetector(FamilyDetector):
             for index, group in enumerate(groups)
         ]
         covariances = np.tile(_DRAFT_DEVIATION**2 * np.eye(2), (len(chosen), 1, 1))
-        confidences = 1 / (1 + np.exp(-odds))
+        confidences = 1 / (1 + np.exp(-odds[chosen]))
         fields = _places(places[chosen], covariances, np.full(len(chosen), np.nan))
         return sorted_targets(
             SquareMarker(
@@ -137,16 +144,53 @@ def _grid(marker: SquareMarker) -> tuple[int, int]:
     return words(marker.family).shape[1] + 2 * marker.border, marker.border
 
 
-def _best(corners: np.ndarray, odds: np.ndarray) -> list[int]:
-    """Return the indices of the readings, shape (k,), that no better one of their place beats."""
+def _odds_together(readings: np.ndarray, one_place: Rivals, groups: Groups) -> np.ndarray:
+    """Return the logarithmic odds of the readings, shape (k,), as all of them show the groups.
+
+    A group is there or not. One marker shows it, whichever it is, or different ones together,
+    each by its lead over other groups in its place; so do those that a smaller dictionary does not
+    have for a larger one. One texture may show several, so that they need more. Where another
+    group reads the same places, the surer one is there.
+    """
+    group, number, _, of_group, others = readings.T
+    odds = -np.logaddexp(-of_group, others)
+    lead = of_group.copy()
+    for index in range(len(lead)):
+        rivals = (group != group[index]) & one_place(index)
+        lead[index] -= of_group[rivals].max(initial=0.0)
+    doubt = log(len(groups) ** _SEVERAL - 1) if len(groups) > 1 else -inf
+    alone = log(len(groups) ** _ALONE - 1) if len(groups) > 1 else -inf
+    against = np.full(len(odds), inf)
+    for index, names in enumerate(groups):
+        sizes = np.array([len(words(name)) for name in names])
+        of_this = group == index
+        some = number[of_this].astype(int)
+        surest, whole, leading = np.zeros((3, sizes[-1]))
+        np.maximum.at(surest, some, np.minimum(lead, odds)[of_this])
+        np.maximum.at(whole, some, of_group[of_this])
+        leading[some] = -np.inf
+        np.maximum.at(leading, some, lead[of_this])
+        together, shown = np.cumsum(surest)[sizes - 1], np.cumsum(surest > 0)[sizes - 1]
+        by_chance = np.minimum(shown[:-1] * np.diff(np.log(sizes)), _LARGER)
+        size = sizes[np.argmax(together - np.cumsum([0.0, *by_chance]))]
+        there = max(whole[:size].max() - alone, surest[:size].sum() - doubt)
+        rivals = -leading[:size].sum()
+        against[of_this & (number < size)] = np.logaddexp(-there, rivals)
+    of_image: np.ndarray = -np.logaddexp(-odds, against)
+    return of_image
+
+
+def _one_place(corners: np.ndarray) -> Rivals:
+    """Return which of k readings, whose corners have the shape (k, 4, 2), have one place."""
     sizes = np.linalg.norm(corners - np.roll(corners, 2, axis=1), axis=2).max(axis=1)
     middles = corners.mean(axis=1)
-    chosen: list[int] = []
-    for index in np.argsort(-odds, kind='stable').tolist():
-        distances = np.linalg.norm(middles[chosen] - middles[index], axis=1)
-        if (distances > _SAME_PLACE * np.maximum(sizes[chosen], sizes[index])).all():
-            chosen.append(index)
-    return chosen
+
+    def near(index: int) -> np.ndarray:
+        distances = np.linalg.norm(middles - middles[index], axis=1)
+        some: np.ndarray = distances <= _SAME_PLACE * np.maximum(sizes, sizes[index])
+        return some
+
+    return near
 
 
 def _from_halves(gray: np.ndarray, corners: np.ndarray, cells: int, border: int) -> np.ndarray:

@@ -41,9 +41,9 @@ _BORDER_WEIGHT = 0.3  # of the cells of the border, which are alike in other qua
 _CORNER_WEIGHT = 0.7
 _DOUBT = 6.0  # logarithmic odds against a marker that nothing but a quadrilateral speaks for
 _PLAIN = 0.35  # logarithmic odds against a marker, for each edge less than random cells have
-_SEVERAL = 3.5  # times the logarithm of their number, against each of several groups
-_SHOWN = 6.9  # logarithmic odds on a group, 1000 to 1, from which its markers are not doubted
-_MINIMUM_ODDS = 2.2  # for a marker to be reported: nine to one
+
+MINIMUM_ODDS = 2.2
+"""Logarithmic odds of a marker that is reported: nine to one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +55,8 @@ class Readings:
     number: np.ndarray  # ID
     turn: np.ndarray  # index of the corner that is top left in the upright marker
     border: np.ndarray  # width of the border, cells
-    odds: np.ndarray  # logarithmic, that the marker is this one
+    odds: np.ndarray  # logarithmic, that it is a marker of the group, if the group is there
+    others: np.ndarray  # logarithmic odds of other markers of the group against this one
 
 
 def read(gray: np.ndarray, corners: np.ndarray, groups: Sequence[Sequence[str]]) -> Readings:
@@ -63,8 +64,7 @@ def read(gray: np.ndarray, corners: np.ndarray, groups: Sequence[Sequence[str]])
 
     A group has dictionaries that begin with the same markers, the smallest first.
     """
-    found = [np.zeros((0, 6))]
-    doubt = _SEVERAL * log(len(groups))
+    found = [np.zeros((0, 7))]
     frames = square_frames(corners)
     bordered = np.flatnonzero(_dark_inside(gray, frames, _DEPTH))
     sizes = np.sqrt([cv2.contourArea(of.astype(np.float32)) for of in corners])
@@ -88,25 +88,18 @@ def read(gray: np.ndarray, corners: np.ndarray, groups: Sequence[Sequence[str]])
             odds = evidence @ prints - prior
             best = odds.argmax(axis=1)
             total = odds[np.arange(len(best)), best] + against - _DOUBT - plain[best]
-            likely = np.flatnonzero(total > _MINIMUM_ODDS)
+            likely = np.flatnonzero(total > MINIMUM_ODDS)
             odds, best, total = odds[likely], best[likely], total[likely]
-            # Against another marker of the group, and against none of them. A turn of the same
-            # one is no other: some are symmetric.
+            # A turn of the same marker is no other: some are symmetric.
             number, turn = np.divmod(best, 4)
             rows = np.arange(len(best))[:, None]
             odds -= odds[rows, best[:, None]]
             odds[rows, 4 * number[:, None] + np.arange(4)] = -np.inf
             second = odds.max(axis=1, initial=-np.inf)
             others = second + np.log(np.exp(odds - second[:, None]).sum(axis=1))
-            # Different markers together show a group that each of them leaves in doubt.
-            of_group = np.zeros(prints.shape[1] // 4)
-            np.maximum.at(of_group, number, -np.logaddexp(doubt - total, others))
-            shown = of_group.sum() >= _SHOWN
-            total = -np.logaddexp((0 if shown else doubt) - total, others)
-            good = total > _MINIMUM_ODDS
             alike = np.full((2, len(best)), [[index], [border]])
-            columns = (which[likely], alike[0], number, turn, alike[1], total)
-            found.append(np.stack(columns, axis=1)[good])
+            columns = (which[likely], alike[0], number, turn, alike[1], total, others)
+            found.append(np.stack(columns, axis=1))
     table = np.concatenate(found)
     which, group, number, turn, widths = table[:, :5].T.astype(int)
     return Readings(
@@ -116,6 +109,7 @@ def read(gray: np.ndarray, corners: np.ndarray, groups: Sequence[Sequence[str]])
         turn=turn,
         border=widths,
         odds=table[:, 5],
+        others=table[:, 6],
     )
 
 
