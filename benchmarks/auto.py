@@ -18,14 +18,14 @@ from ahf_ros.evaluation import score, total
 from ahf_ros.session import identify
 from ahf_ros.synthetic.patterns import LIGHT_NAMES, benchmark_lights
 from ahf_ros.synthetic.scene import SceneSettings, render
-from ahf_ros.target import Target
+from ahf_ros.target import Target, TrueTarget
 from benchmarks import report
 
 RADII = {'gsi': 4.0, 'cctag': 24.0}
 """Of dots, px, of kinds for which 12 px is not usual; CCTags have no dot, but an outer circle."""
 
 
-def farthest(named: Sequence[Target], found: Sequence[Target]) -> float:
+def farthest(named: Sequence[Target | TrueTarget], found: Sequence[Target | TrueTarget]) -> float:
     """Return the largest distance of a target from the next that is named with its ID, px."""
     nearest = [
         min(np.hypot(it.x - of.x, it.y - of.y) for it in named if it.id == of.id)
