@@ -141,11 +141,15 @@ def _identified(
     and doubtful ones with what certain ones show.
     """
     rings = identify(gray, frames, polarity, family, most=1)
-    likely = rings.select(rings.of_target >= _SURE_OF_TARGET)
+    possible = rings.select(rings.of_target >= _POSSIBLE)
+    if not len(possible.ids):
+        return possible, gray
+    light = in_light(gray, possible, family)
+    again = align(light, possible.frames, possible.ids, possible.edges, family)
+    likely = again.select(again.of_target >= _SURE_OF_TARGET)
     if not len(likely.ids):
-        return rings.select(rings.of_target >= _POSSIBLE), gray
-    light = in_light(gray, likely, family)
-    camera = Prior.of_camera(align(light, likely.frames, likely.ids, likely.edges, family))
+        return possible, gray
+    camera = Prior.of_camera(likely)
     first = rings.select(rings.confidence >= _TELLING)
     rings = identify(light, frames, polarity, family, camera)
     certain = rings.select(rings.confidence >= _CERTAIN)

@@ -471,12 +471,10 @@ def in_light(gray: np.ndarray, rings: Aligned, family: CircleFamily) -> np.ndarr
     Blur mixes light, and not gray values, which matters where rings are narrow.
     """
     some = rings.select(np.argsort(-rings.plain, kind='stable')[:_TELLING_OF_GAMMA])
-    if len(some.ids) < _ENOUGH:
-        return gray
     light: np.ndarray = 255 * (gray.clip(0) / 255) ** np.float32(_GAMMA)
-    lights = Lights.about(light, some.frames)
-    left = _settled(light, some, family, _USUAL, lights).left
-    return light if np.median(left - some.left) < -_CLEARLY else gray
+    again = _settled(light, some, family, _USUAL, Lights.about(light, some.frames))
+    telling = np.maximum(some.of_target, again.of_target)
+    return light if telling @ (again.left - some.left + _CLEARLY) < 0 else gray
 
 
 def align(
