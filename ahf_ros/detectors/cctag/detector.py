@@ -18,6 +18,7 @@ import numpy as np
 from ahf_ros.blas import one_blas_thread
 from ahf_ros.codes import CCTAG_NAMES
 from ahf_ros.codes.cctag import CircleFamily, circle_family
+from ahf_ros.detectors.cctag.light import EDGES
 from ahf_ros.detectors.cctag.rings import Aligned, Prior, align, identify, in_light, likely_rings
 from ahf_ros.detectors.claims import best_targets
 from ahf_ros.detectors.contract import FamilyDetector, moved_targets
@@ -116,7 +117,7 @@ class CctagDetector(FamilyDetector):
             for family in self.design:
                 frames = likely_rings(gray, circles, octave.radii, polarity, family)
                 rings, light = _identified(gray, frames, polarity, family)
-                found += self._shown(_owning(light, _single(rings), polarity, family), family.name)
+                found += self._shown(_owned(light, _single(rings), polarity, family), family.name)
         return found
 
     def _shown(self, rings: Aligned, family: str) -> list[Target]:
@@ -150,27 +151,49 @@ def _identified(
     if not len(likely.ids):
         return possible, gray
     camera = Prior.of_camera(likely)
-    first = rings.select(rings.confidence >= _TELLING)
-    rings = identify(light, frames, polarity, family, camera)
-    certain = rings.select(rings.confidence >= _CERTAIN)
-    first = first.select(_alone(first.frames, certain.frames))
-    rings = rings.select(_alone(rings.frames, first.frames))
-    rings = Aligned.joined([rings, first])
-    rings = rings.select(rings.of_target >= _POSSIBLE)
-    likely = rings.select(rings.of_target >= _SURE_OF_TARGET)
-    known = Prior()
+    again = identify(light, frames, polarity, family, camera)
+    known, rings = camera, _best(Aligned.joined([rings, again]), camera)
     for _ in range(_ROUNDS):
-        prior = Prior.after(likely.select(likely.confidence >= _PROBABLE))
+        sure = rings.of_target >= _SURE_OF_TARGET
+        prior = Prior.after(rings.select(sure & (rings.confidence >= _PROBABLE)))
         if prior == known:
             break
         known = prior
-        told = likely.confidence >= _TELLING
-        unread = frames[_alone(frames, likely.frames)]
-        doubtful = np.concatenate([likely.frames[~told], unread])
-        again = identify(light, doubtful, polarity, family, prior)
-        certain = likely.select(told)
-        rings = likely = Aligned.joined([certain, again.select(again.of_target >= _POSSIBLE)])
+        rings = _best(rings, prior)
+        certain = rings.select(rings.confidence >= _TELLING)
+        doubtful = np.concatenate([rings.frames, frames])
+        doubtful = doubtful[_alone(doubtful, certain.frames)]
+        again = _readings(light, doubtful, polarity, family, prior)
+        rings = _best(Aligned.joined([rings, again]), prior)
     return rings, light
+
+
+def _readings(
+    gray: np.ndarray, frames: np.ndarray, polarity: int, family: CircleFamily, prior: Prior
+) -> Aligned:
+    """Return readings of targets in light of one edge at the most, of two, and so on."""
+    return Aligned.joined(
+        [identify(gray, frames, polarity, family, prior, most) for most in range(1, EDGES + 1)]
+    )
+
+
+def _best(rings: Aligned, prior: Prior) -> Aligned:
+    """Return the likeliest reading of each place, whose rivals are also those of other IDs."""
+    rings = rings.select(rings.of_target >= _POSSIBLE)
+    size = frame.mean_radii(rings.frames)
+    kept: list[int] = []
+    margin = rings.margin.copy()
+    left = np.ones(len(size), bool)
+    for index in np.argsort(prior.cost(rings, size), kind='stable').tolist():
+        if not left[index]:
+            continue
+        near = _near(rings.frames, rings.frames[[index]])[:, 0]
+        cost = prior.cost(rings, size[index])
+        others = cost[near & (rings.ids != rings.ids[index])] - cost[index]
+        margin[index] = min(margin[index], others.min(initial=np.inf))
+        left &= ~near
+        kept.append(index)
+    return replace(rings, margin=margin).select(np.array(kept, int))
 
 
 def _near(frames: np.ndarray, others: np.ndarray) -> np.ndarray:
@@ -197,18 +220,29 @@ def _single(rings: Aligned) -> Aligned:
     return rings.select(single | (rings.confidence < _CERTAIN))
 
 
-def _owning(gray: np.ndarray, rings: Aligned, polarity: int, family: CircleFamily) -> Aligned:
-    """Return the readings less those of doubtful targets that another family explains better."""
-    doubtful = np.flatnonzero((rings.of_target >= _CERTAIN) & (rings.confidence < _SURE))
-    beaten = np.zeros(len(rings.ids), bool)
+def _owned(gray: np.ndarray, rings: Aligned, polarity: int, family: CircleFamily) -> Aligned:
+    """Return the readings; what other families make of doubtful targets are rivals, too.
+
+    The more targets of an image are of the family, the likelier are the others.
+    """
+    likely = np.flatnonzero(rings.of_target >= _CERTAIN)
+    doubtful = likely[rings.confidence[likely] < _SURE]
+    against, usual = np.full(len(rings.ids), np.inf), Prior()
     for name in CCTAG_NAMES:
         if name == family.name:
             continue
-        others = identify(gray, rings.frames[doubtful], polarity, circle_family(name))
+        frames = rings.frames[doubtful]
+        others = _readings(gray, frames, polarity, circle_family(name), usual)
+        others = others.select(others.of_target >= _CERTAIN)
         for index in doubtful.tolist():
-            near = _near(rings.frames[[index]], others.frames)[0]
-            beaten[index] |= (others.left[near] < rings.left[index]).any()
-    return rings.select(~beaten)
+            own = rings.select([index])
+            size = frame.mean_radii(own.frames)
+            rivals = others.select(_near(own.frames, others.frames)[0])
+            cost = usual.cost(rivals, size) - usual.cost(own, size)
+            against[index] = min(against[index], cost.min(initial=np.inf))
+    beaten = (against < 0).sum()
+    of_family = np.log((len(likely) - beaten + 1) / (beaten + 1))
+    return replace(rings, margin=np.minimum(rings.margin, against + of_family))
 
 
 def _circles(octave: Octave) -> Dots:

@@ -28,6 +28,7 @@ from ahf_ros.features import frame
 from ahf_ros.features.array_record import ArrayRecord
 from ahf_ros.features.dots import Dots
 from ahf_ros.features.logistic import logistic
+from ahf_ros.features.robust import NORMAL
 from ahf_ros.features.sampling import sample_circles
 
 _FEW_ANGLES, _FEW_RADII = ANGLES[::2], 2  # of a glance: one of so many radii
@@ -52,6 +53,7 @@ _CLEARLY = 0.03  # `left` by which rings must be better explained
 _TELLING_OF_GAMMA = 16  # targets
 _ENOUGH = 4  # certain targets, that tell of the edges of an image
 _OF_CAMERA = 0.03  # standard deviation of the sharpening of one camera
+_OF_IMAGE = 0.1, 0.1, _OF_CAMERA  # of growth, ln of the blur and sharpening, of an image's targets
 _SCALES = (0.93, 0.965, 1.0, 1.035, 1.07)  # of the radius, about a frame
 _READINGS = 5  # IDs that are brought onto the image from a frame
 _REPEATS, _STAYING = 6, 0.1  # until the square of a move is a small part of the variance
@@ -103,11 +105,12 @@ class Prior:
     sharpening: float = 0.0
     deviations: tuple[float, float, float] = (0.5, 0.35, 0.35)
 
-    def squares(self, rings: Aligned) -> np.ndarray:
-        """Return the squares of the distances from what is known, in deviations, shape (k,)."""
+    def cost(self, rings: Aligned, size: np.ndarray) -> np.ndarray:
+        """Return what is taken from ln of the odds of rings of a size, px, shape (k,)."""
         away = self.away(rings.shift, rings.blur, rings.sharpening) / self.deviations
-        squares: np.ndarray = (away**2).sum(axis=1)
-        return squares
+        independent = size * np.ptp(PROFILE) / _INDEPENDENT
+        cost: np.ndarray = (independent * rings.known * rings.left + (away**2).sum(axis=1)) / 2
+        return cost
 
     def away(self, shift: np.ndarray, blur: np.ndarray, sharpening: np.ndarray) -> np.ndarray:
         """Return how far edges are from what is known, in the units of deviations, (k, 3)."""
@@ -145,14 +148,16 @@ class Prior:
     @staticmethod
     def after(rings: Aligned) -> Prior:
         """Return what certain targets tell of the others."""
-        if len(rings.ids) < _ENOUGH:
+        count = len(rings.ids)
+        if count < _ENOUGH:
             return Prior()
-        return Prior(
-            float(np.median(rings.shift)),
-            float(np.median(rings.blur)),
-            float(np.median(rings.sharpening)),
-            (0.1, 0.1, _OF_CAMERA),
-        )
+        edges = np.stack([rings.shift, np.log(rings.blur), rings.sharpening], axis=1)
+        usual = np.median(edges, axis=0)
+        spread = NORMAL * np.median(np.abs(edges - usual), axis=0)
+        variance = (count * spread**2 + _ENOUGH * np.square(_OF_IMAGE)) / (count + _ENOUGH)
+        shift, blur, sharpening = usual.tolist()
+        of_shift, of_blur, of_sharpening = np.sqrt(variance).tolist()
+        return Prior(shift, math.exp(blur), sharpening, (of_shift, of_blur, of_sharpening))
 
 
 _USUAL = Prior()
@@ -393,10 +398,9 @@ def identify(
     more = align(gray, starts[others], ids[others], edges[others], family, prior, of_more)
     every = Aligned.joined([first, more])
     rows, columns = np.concatenate([tried, others], axis=1)
-    independent = frame.mean_radii(starts[:, 0]) * np.ptp(PROFILE) / _INDEPENDENT
-    left = np.where(every.colour == polarity, every.left, 0.0)
+    every = replace(every, left=np.where(every.colour == polarity, every.left, 0.0))
     cost = np.full(ids.shape, np.inf)
-    cost[rows, columns] = (independent[rows] * every.known * left + prior.squares(every)) / 2
+    cost[rows, columns] = prior.cost(every, frame.mean_radii(starts[rows, 0]))
     index = np.zeros(ids.shape, int)
     index[rows, columns] = np.arange(len(rows))
     best = every.select(index[np.arange(len(ids)), cost.argmin(axis=1)])
