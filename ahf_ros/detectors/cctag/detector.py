@@ -117,7 +117,8 @@ class CctagDetector(FamilyDetector):
             for family in self.design:
                 frames = likely_rings(gray, circles, octave.radii, polarity, family)
                 rings, light = _identified(gray, frames, polarity, family)
-                found += self._shown(_owned(light, _single(rings), polarity, family), family.name)
+                rings = _single(_together(rings))
+                found += self._shown(_owned(light, rings, polarity, family), family.name)
         return found
 
     def _shown(self, rings: Aligned, family: str) -> list[Target]:
@@ -206,6 +207,17 @@ def _near(frames: np.ndarray, others: np.ndarray) -> np.ndarray:
 def _alone(frames: np.ndarray, others: np.ndarray) -> np.ndarray:
     """Return whether targets, (k, 3, 3), are at the place of no other, (n, 3, 3), shape (k,)."""
     return np.logical_not(_near(frames, others).any(axis=1))
+
+
+def _together(rings: Aligned) -> Aligned:
+    """Return the readings, in doubt where most of what may be targets of an image is not read.
+
+    Print and camera are the same for all. Where few readings are certain, they may be unlike what
+    is expected, so that others are wrong.
+    """
+    certain = int((rings.confidence >= _TELLING).sum())
+    doubt = max(float(np.log((len(rings.ids) - certain + 1) / (certain + 1))), 0.0)
+    return replace(rings, unusual=rings.unusual + doubt)
 
 
 def _single(rings: Aligned) -> Aligned:

@@ -53,7 +53,7 @@ _HIGHEST, _MOST_LIGHT = 2.5, 4.0  # ln of an edge, and of light
 _EVIDENCE = 25.0  # twice the ln of the likelihood, that an edge adds
 _LEAST_VARIANCE = 0.003**2
 _OF_CLIPPED = 0.1  # weight of gray values that are clipped
-_MANY = 0.2  # share of gray values, from which it matters that they are clipped
+_MANY = 0.02  # share of gray values, from which it matters that they are clipped
 _INTERPOLATED = 0.58  # distance of what linear interpolation mixes with a quarter each, px
 _BRIGHTEST = 2.0  # gray value, of the mean, that has more weight than others
 
