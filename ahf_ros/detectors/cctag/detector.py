@@ -239,19 +239,18 @@ def _owned(gray: np.ndarray, rings: Aligned, polarity: int, family: CircleFamily
     """
     likely = np.flatnonzero(rings.of_target >= _CERTAIN)
     doubtful = likely[rings.confidence[likely] < _SURE]
-    against, usual = np.full(len(rings.ids), np.inf), Prior()
+    own, usual, against = rings.select(doubtful), Prior(), np.full(len(rings.ids), np.inf)
+    size = frame.mean_radii(own.frames)
+    cost = usual.cost(own, size)
     for name in CCTAG_NAMES:
         if name == family.name:
             continue
-        frames = rings.frames[doubtful]
-        others = _readings(gray, frames, polarity, circle_family(name), usual)
+        others = _readings(gray, own.frames, polarity, circle_family(name), usual)
         others = others.select(others.of_target >= _CERTAIN)
-        for index in doubtful.tolist():
-            own = rings.select([index])
-            size = frame.mean_radii(own.frames)
-            rivals = others.select(_near(own.frames, others.frames)[0])
-            cost = usual.cost(rivals, size) - usual.cost(own, size)
-            against[index] = min(against[index], cost.min(initial=np.inf))
+        near = _near(own.frames, others.frames)
+        for row, index in enumerate(doubtful.tolist()):
+            of_rivals = usual.cost(others.select(near[row]), size[[row]]) - cost[row]
+            against[index] = min(against[index], of_rivals.min(initial=np.inf))
     beaten = (against < 0).sum()
     of_family = np.log((len(likely) - beaten + 1) / (beaten + 1))
     return replace(rings, margin=np.minimum(rings.margin, against + of_family))
