@@ -152,8 +152,11 @@ def _identified(
     if not len(likely.ids):
         return possible, gray
     camera = Prior.of_camera(likely)
-    again = identify(light, frames, polarity, family, camera)
-    known, rings = camera, _best(Aligned.joined([rings, again]), camera)
+    # Where one edge of light leaves no doubt, others are not looked for.
+    sure = (possible.confidence >= _SURE) & (again.of_target >= _SURE)
+    told = replace(again, margin=possible.margin).select(sure)
+    again = identify(light, frames[_alone(frames, told.frames)], polarity, family, camera)
+    known, rings = camera, _best(Aligned.joined([rings, told, again]), camera)
     for _ in range(_ROUNDS):
         sure = rings.of_target >= _SURE_OF_TARGET
         prior = Prior.after(rings.select(sure & (rings.confidence >= _PROBABLE)))
