@@ -77,6 +77,7 @@ _OF_TARGET = np.array([-14.1, -1.5, 3.0, -1.0])  # of one, `clear`, `plain`, `un
 _USUAL_EDGES = 0.13, 0.3  # deviations of growth, px, and of ln of the blur, of targets
 _GROWTH_HIDES = 3.0  # ln of odds, at the most growth
 _SHARPENING_HIDES = 0.8  # ln of odds, of an amount of 1
+_CLIPPING_HIDES = 3.0  # ln of odds, where all gray values are clipped
 _PLAIN = -5.0, 5.0  # beyond which it says no more
 _BY_SIZE, _USUAL_SIZE = 2.5, 12.0  # what `plain` grows by ln of the radius, from its px
 _AS_CLEAR = -6.0  # as it gets, by anything that is round
@@ -571,6 +572,7 @@ def _aligned(
     )
     rest = np.log(np.maximum(left, 1e-6) / np.maximum(shown, 1e-6))
     good = np.where(agreeing, np.exp(-rest), 1e-3)
+    known = (rays.gain @ ALONG).mean(axis=1) / ALONG.sum()
     return Aligned(
         frames=frames,
         ids=ids,
@@ -589,8 +591,8 @@ def _aligned(
             blur / size,
         ),
         unusual=_unusual(shift, blur, prior) * np.minimum(3 * (1 - agreeing.mean(axis=1)), 1)
-        + _hiding(shift, sharpening, family.narrow * size),
-        known=(rays.gain @ ALONG).mean(axis=1) / ALONG.sum(),
+        + _hiding(shift, sharpening, known, family.narrow * size),
+        known=known,
         margin=np.full(count, np.nan),
     )
 
@@ -602,11 +604,14 @@ def _unusual(shift: np.ndarray, blur: np.ndarray, prior: Prior) -> np.ndarray:
     return squares
 
 
-def _hiding(shift: np.ndarray, sharpening: np.ndarray, narrow: np.ndarray) -> np.ndarray:
-    """Return by how much growth and sharpening hide narrow rings, (k,), which have so many px."""
+def _hiding(
+    shift: np.ndarray, sharpening: np.ndarray, known: np.ndarray, narrow: np.ndarray
+) -> np.ndarray:
+    """Return by how much growth, sharpening and clipping hide narrow rings of so many px, (k,)."""
     grown = _GROWTH_HIDES * (shift / (_MOST_SHIFT * narrow)) ** 8
     sharpened = _SHARPENING_HIDES * sharpening**2 / (1 + np.abs(sharpening))
-    hidden: np.ndarray = grown + sharpened * (_SHARPENED / narrow) ** 2
+    others = sharpened + _CLIPPING_HIDES * (1 - known)
+    hidden: np.ndarray = grown + others * (_SHARPENED / narrow) ** 2
     return hidden
 
 
