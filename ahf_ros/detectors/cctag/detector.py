@@ -18,6 +18,7 @@ import numpy as np
 from ahf_ros.blas import one_blas_thread
 from ahf_ros.codes import CCTAG_NAMES
 from ahf_ros.codes.cctag import CircleFamily, circle_family
+from ahf_ros.detectors.cctag.light import EDGES
 from ahf_ros.detectors.cctag.rings import Aligned, Prior, align, identify, in_light, likely_rings
 from ahf_ros.detectors.claims import best_targets
 from ahf_ros.detectors.contract import FamilyDetector, moved_targets
@@ -116,7 +117,8 @@ class CctagDetector(FamilyDetector):
             for family in self.design:
                 frames = likely_rings(gray, circles, octave.radii, polarity, family)
                 rings, light = _identified(gray, frames, polarity, family)
-                found += self._shown(_owning(light, _single(rings), polarity, family), family.name)
+                rings = _single(_together(rings))
+                found += self._shown(_owned(light, rings, polarity, family), family.name)
         return found
 
     def _shown(self, rings: Aligned, family: str) -> list[Target]:
@@ -141,32 +143,61 @@ def _identified(
     and doubtful ones with what certain ones show.
     """
     rings = identify(gray, frames, polarity, family, most=1)
-    likely = rings.select(rings.of_target >= _SURE_OF_TARGET)
+    possible = rings.select(rings.of_target >= _POSSIBLE)
+    if not len(possible.ids):
+        return possible, gray
+    light = in_light(gray, possible, family)
+    again = align(light, possible.frames, possible.ids, possible.edges, family)
+    likely = again.select(again.of_target >= _SURE_OF_TARGET)
     if not len(likely.ids):
-        return rings.select(rings.of_target >= _POSSIBLE), gray
-    light = in_light(gray, likely, family)
-    camera = Prior.of_camera(align(light, likely.frames, likely.ids, likely.edges, family))
-    first = rings.select(rings.confidence >= _TELLING)
-    rings = identify(light, frames, polarity, family, camera)
-    certain = rings.select(rings.confidence >= _CERTAIN)
-    first = first.select(_alone(first.frames, certain.frames))
-    rings = rings.select(_alone(rings.frames, first.frames))
-    rings = Aligned.joined([rings, first])
-    rings = rings.select(rings.of_target >= _POSSIBLE)
-    likely = rings.select(rings.of_target >= _SURE_OF_TARGET)
-    known = Prior()
+        return possible, gray
+    camera = Prior.of_camera(likely)
+    # Where one edge of light leaves no doubt, others are not looked for.
+    sure = (possible.confidence >= _SURE) & (again.of_target >= _SURE)
+    told = replace(again, margin=possible.margin).select(sure)
+    again = identify(light, frames[_alone(frames, told.frames)], polarity, family, camera)
+    known, rings = camera, _best(Aligned.joined([rings, told, again]), camera)
     for _ in range(_ROUNDS):
-        prior = Prior.after(likely.select(likely.confidence >= _PROBABLE))
+        sure = rings.of_target >= _SURE_OF_TARGET
+        prior = Prior.after(rings.select(sure & (rings.confidence >= _PROBABLE)))
         if prior == known:
             break
         known = prior
-        told = likely.confidence >= _TELLING
-        unread = frames[_alone(frames, likely.frames)]
-        doubtful = np.concatenate([likely.frames[~told], unread])
-        again = identify(light, doubtful, polarity, family, prior)
-        certain = likely.select(told)
-        rings = likely = Aligned.joined([certain, again.select(again.of_target >= _POSSIBLE)])
+        rings = _best(rings, prior)
+        certain = rings.select(rings.confidence >= _TELLING)
+        doubtful = np.concatenate([rings.frames, frames])
+        doubtful = doubtful[_alone(doubtful, certain.frames)]
+        again = _readings(light, doubtful, polarity, family, prior)
+        rings = _best(Aligned.joined([rings, again]), prior)
     return rings, light
+
+
+def _readings(
+    gray: np.ndarray, frames: np.ndarray, polarity: int, family: CircleFamily, prior: Prior
+) -> Aligned:
+    """Return readings of targets in light of one edge at the most, of two, and so on."""
+    return Aligned.joined(
+        [identify(gray, frames, polarity, family, prior, most) for most in range(1, EDGES + 1)]
+    )
+
+
+def _best(rings: Aligned, prior: Prior) -> Aligned:
+    """Return the likeliest reading of each place, whose rivals are also those of other IDs."""
+    rings = rings.select(rings.of_target >= _POSSIBLE)
+    size = frame.mean_radii(rings.frames)
+    kept: list[int] = []
+    margin = rings.margin.copy()
+    left = np.ones(len(size), bool)
+    for index in np.argsort(prior.cost(rings, size), kind='stable').tolist():
+        if not left[index]:
+            continue
+        near = _near(rings.frames, rings.frames[[index]])[:, 0]
+        cost = prior.cost(rings, size[index])
+        others = cost[near & (rings.ids != rings.ids[index])] - cost[index]
+        margin[index] = min(margin[index], others.min(initial=np.inf))
+        left &= ~near
+        kept.append(index)
+    return replace(rings, margin=margin).select(np.array(kept, int))
 
 
 def _near(frames: np.ndarray, others: np.ndarray) -> np.ndarray:
@@ -181,6 +212,17 @@ def _alone(frames: np.ndarray, others: np.ndarray) -> np.ndarray:
     return np.logical_not(_near(frames, others).any(axis=1))
 
 
+def _together(rings: Aligned) -> Aligned:
+    """Return the readings, in doubt where most of what may be targets of an image is not read.
+
+    Print and camera are the same for all. Where few readings are certain, they may be unlike what
+    is expected, so that others are wrong.
+    """
+    certain = int((rings.confidence >= _TELLING).sum())
+    doubt = max(float(np.log((len(rings.ids) - certain + 1) / (certain + 1))), 0.0)
+    return replace(rings, unusual=rings.unusual + doubt)
+
+
 def _single(rings: Aligned) -> Aligned:
     """Return the readings less those of IDs that are read in doubt in too many other places.
 
@@ -193,18 +235,28 @@ def _single(rings: Aligned) -> Aligned:
     return rings.select(single | (rings.confidence < _CERTAIN))
 
 
-def _owning(gray: np.ndarray, rings: Aligned, polarity: int, family: CircleFamily) -> Aligned:
-    """Return the readings less those of doubtful targets that another family explains better."""
-    doubtful = np.flatnonzero((rings.of_target >= _CERTAIN) & (rings.confidence < _SURE))
-    beaten = np.zeros(len(rings.ids), bool)
+def _owned(gray: np.ndarray, rings: Aligned, polarity: int, family: CircleFamily) -> Aligned:
+    """Return the readings; what other families make of doubtful targets are rivals, too.
+
+    The more targets of an image are of the family, the likelier are the others.
+    """
+    likely = np.flatnonzero(rings.of_target >= _CERTAIN)
+    doubtful = likely[rings.confidence[likely] < _SURE]
+    own, usual, against = rings.select(doubtful), Prior(), np.full(len(rings.ids), np.inf)
+    size = frame.mean_radii(own.frames)
+    cost = usual.cost(own, size)
     for name in CCTAG_NAMES:
         if name == family.name:
             continue
-        others = identify(gray, rings.frames[doubtful], polarity, circle_family(name))
-        for index in doubtful.tolist():
-            near = _near(rings.frames[[index]], others.frames)[0]
-            beaten[index] |= (others.left[near] < rings.left[index]).any()
-    return rings.select(~beaten)
+        others = _readings(gray, own.frames, polarity, circle_family(name), usual)
+        others = others.select(others.of_target >= _CERTAIN)
+        near = _near(own.frames, others.frames)
+        for row, index in enumerate(doubtful.tolist()):
+            of_rivals = usual.cost(others.select(near[row]), size[[row]]) - cost[row]
+            against[index] = min(against[index], of_rivals.min(initial=np.inf))
+    beaten = (against < 0).sum()
+    of_family = np.log((len(likely) - beaten + 1) / (beaten + 1))
+    return replace(rings, margin=np.minimum(rings.margin, against + of_family))
 
 
 def _circles(octave: Octave) -> Dots:

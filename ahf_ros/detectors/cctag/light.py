@@ -53,7 +53,7 @@ _HIGHEST, _MOST_LIGHT = 2.5, 4.0  # ln of an edge, and of light
 _EVIDENCE = 25.0  # twice the ln of the likelihood, that an edge adds
 _LEAST_VARIANCE = 0.003**2
 _OF_CLIPPED = 0.1  # weight of gray values that are clipped
-_MANY = 0.2  # share of gray values, from which it matters that they are clipped
+_MANY = 0.02  # share of gray values, from which it matters that they are clipped
 _INTERPOLATED = 0.58  # distance of what linear interpolation mixes with a quarter each, px
 _BRIGHTEST = 2.0  # gray value, of the mean, that has more weight than others
 
@@ -134,8 +134,16 @@ def lit(gray: np.ndarray, frames: np.ndarray, lights: Lights) -> Seen:
     light = lights.at(frames, ANGLES, PROFILE)
     light *= np.maximum((values / light).mean(axis=2, keepdims=True), 1e-3)
     lowest, highest = (np.float32(of) / light for of in (BLACK, WHITE))
-    apart = np.rint(_INTERPOLATED / frame.mean_radii(frames) / (PROFILE[1] - PROFILE[0]))
-    return Seen(values / light, lowest, highest, many, apart.astype(int))
+    step = frame.mean_radii(frames) * (PROFILE[1] - PROFILE[0])
+    apart = np.maximum(np.rint(_INTERPOLATED / step), 1)
+    mixed = np.zeros_like(values)
+    points = frame.project(frames[many], frame.circle_points(ANGLES, PROFILE))
+    between = points - np.floor(points)
+    away = points - frames[many][:, None, None, :2, 2]
+    away /= np.linalg.norm(away, axis=-1, keepdims=True)
+    variance = (away**2 * between * (1 - between)).sum(axis=-1)
+    mixed[many] = variance / ((apart * step)[many, None, None]) ** 2
+    return Seen(values / light, lowest, highest, many, apart.astype(int), mixed)
 
 
 @dataclass(frozen=True, slots=True)

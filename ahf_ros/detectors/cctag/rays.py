@@ -40,6 +40,7 @@ class Seen(ArrayRecord):
     highest: np.ndarray
     clipped: np.ndarray  # bool, (k,), whether the camera has clipped many
     apart: np.ndarray  # int, (k,), radii that interpolation mixes with one
+    mixed: np.ndarray  # share of these, where many are clipped, (k, rays, n)
 
 
 def robust_rays(seen: Seen, ink: np.ndarray, outlier: float) -> Rays:
@@ -150,6 +151,6 @@ def _as_seen(seen: Seen, model: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
     def mixed(values: np.ndarray) -> np.ndarray:
         before, after = (np.take_along_axis(values, at, axis=2) for at in beside)
-        return values / 2 + (before + after) / 4
+        return values + seen.mixed * ((before + after) / 2 - values)
 
     return seen.values - mixed(shown), mixed((shown == model).astype(np.float32))

@@ -28,6 +28,7 @@ from ahf_ros.features.array_record import ArrayRecord
 from ahf_ros.features.dots import Dots
 from ahf_ros.features.logistic import logistic
 from ahf_ros.features.normal import normal_integral
+from ahf_ros.features.robust import NORMAL
 from ahf_ros.features.sampling import sample_circles
 
 _FEW_ANGLES, _FEW_RADII = ANGLES[::2], 2  # of a glance: one of so many radii
@@ -52,6 +53,7 @@ _CLEARLY = 0.03  # `left` by which rings must be better explained
 _TELLING_OF_GAMMA = 16  # targets
 _ENOUGH = 4  # certain targets, that tell of the edges of an image
 _OF_CAMERA = 0.03  # standard deviation of the sharpening of one camera
+_OF_IMAGE = 0.1, 0.1, _OF_CAMERA  # of growth, ln of the blur and sharpening, of an image's targets
 _SCALES = (0.93, 0.965, 1.0, 1.035, 1.07)  # of the radius, about a frame
 _READINGS = 5  # IDs that are brought onto the image from a frame
 _REPEATS, _STAYING = 6, 0.1  # until the square of a move is a small part of the variance
@@ -75,6 +77,7 @@ _OF_TARGET = np.array([-14.1, -1.5, 3.0, -1.0])  # of one, `clear`, `plain`, `un
 _USUAL_EDGES = 0.13, 0.3  # deviations of growth, px, and of ln of the blur, of targets
 _GROWTH_HIDES = 3.0  # ln of odds, at the most growth
 _SHARPENING_HIDES = 0.8  # ln of odds, of an amount of 1
+_CLIPPING_HIDES = 3.0  # ln of odds, where all gray values are clipped
 _PLAIN = -5.0, 5.0  # beyond which it says no more
 _BY_SIZE, _USUAL_SIZE = 2.5, 12.0  # what `plain` grows by ln of the radius, from its px
 _AS_CLEAR = -6.0  # as it gets, by anything that is round
@@ -103,11 +106,12 @@ class Prior:
     sharpening: float = 0.0
     deviations: tuple[float, float, float] = (0.5, 0.35, 0.35)
 
-    def squares(self, rings: Aligned) -> np.ndarray:
-        """Return the squares of the distances from what is known, in deviations, shape (k,)."""
+    def cost(self, rings: Aligned, size: np.ndarray) -> np.ndarray:
+        """Return what is taken from ln of the odds of rings of a size, px, shape (k,)."""
         away = self.away(rings.shift, rings.blur, rings.sharpening) / self.deviations
-        squares: np.ndarray = (away**2).sum(axis=1)
-        return squares
+        independent = size * np.ptp(PROFILE) / _INDEPENDENT
+        cost: np.ndarray = (independent * rings.known * rings.left + (away**2).sum(axis=1)) / 2
+        return cost
 
     def away(self, shift: np.ndarray, blur: np.ndarray, sharpening: np.ndarray) -> np.ndarray:
         """Return how far edges are from what is known, in the units of deviations, (k, 3)."""
@@ -145,14 +149,16 @@ class Prior:
     @staticmethod
     def after(rings: Aligned) -> Prior:
         """Return what certain targets tell of the others."""
-        if len(rings.ids) < _ENOUGH:
+        count = len(rings.ids)
+        if count < _ENOUGH:
             return Prior()
-        return Prior(
-            float(np.median(rings.shift)),
-            float(np.median(rings.blur)),
-            float(np.median(rings.sharpening)),
-            (0.1, 0.1, _OF_CAMERA),
-        )
+        edges = np.stack([rings.shift, np.log(rings.blur), rings.sharpening], axis=1)
+        usual = np.median(edges, axis=0)
+        spread = NORMAL * np.median(np.abs(edges - usual), axis=0)
+        variance = (count * spread**2 + _ENOUGH * np.square(_OF_IMAGE)) / (count + _ENOUGH)
+        shift, blur, sharpening = usual.tolist()
+        of_shift, of_blur, of_sharpening = np.sqrt(variance).tolist()
+        return Prior(shift, math.exp(blur), sharpening, (of_shift, of_blur, of_sharpening))
 
 
 _USUAL = Prior()
@@ -393,10 +399,9 @@ def identify(
     more = align(gray, starts[others], ids[others], edges[others], family, prior, of_more)
     every = Aligned.joined([first, more])
     rows, columns = np.concatenate([tried, others], axis=1)
-    independent = frame.mean_radii(starts[:, 0]) * np.ptp(PROFILE) / _INDEPENDENT
-    left = np.where(every.colour == polarity, every.left, 0.0)
+    every = replace(every, left=np.where(every.colour == polarity, every.left, 0.0))
     cost = np.full(ids.shape, np.inf)
-    cost[rows, columns] = (independent[rows] * every.known * left + prior.squares(every)) / 2
+    cost[rows, columns] = prior.cost(every, frame.mean_radii(starts[rows, 0]))
     index = np.zeros(ids.shape, int)
     index[rows, columns] = np.arange(len(rows))
     best = every.select(index[np.arange(len(ids)), cost.argmin(axis=1)])
@@ -471,12 +476,10 @@ def in_light(gray: np.ndarray, rings: Aligned, family: CircleFamily) -> np.ndarr
     Blur mixes light, and not gray values, which matters where rings are narrow.
     """
     some = rings.select(np.argsort(-rings.plain, kind='stable')[:_TELLING_OF_GAMMA])
-    if len(some.ids) < _ENOUGH:
-        return gray
     light: np.ndarray = 255 * (gray.clip(0) / 255) ** np.float32(_GAMMA)
-    lights = Lights.about(light, some.frames)
-    left = _settled(light, some, family, _USUAL, lights).left
-    return light if np.median(left - some.left) < -_CLEARLY else gray
+    again = _settled(light, some, family, _USUAL, Lights.about(light, some.frames))
+    telling = np.maximum(some.of_target, again.of_target)
+    return light if telling @ (again.left - some.left + _CLEARLY) < 0 else gray
 
 
 def align(
@@ -569,6 +572,7 @@ def _aligned(
     )
     rest = np.log(np.maximum(left, 1e-6) / np.maximum(shown, 1e-6))
     good = np.where(agreeing, np.exp(-rest), 1e-3)
+    known = (rays.gain @ ALONG).mean(axis=1) / ALONG.sum()
     return Aligned(
         frames=frames,
         ids=ids,
@@ -587,8 +591,8 @@ def _aligned(
             blur / size,
         ),
         unusual=_unusual(shift, blur, prior) * np.minimum(3 * (1 - agreeing.mean(axis=1)), 1)
-        + _hiding(shift, sharpening, family.narrow * size),
-        known=(rays.gain @ ALONG).mean(axis=1) / ALONG.sum(),
+        + _hiding(shift, sharpening, known, family.narrow * size),
+        known=known,
         margin=np.full(count, np.nan),
     )
 
@@ -600,11 +604,14 @@ def _unusual(shift: np.ndarray, blur: np.ndarray, prior: Prior) -> np.ndarray:
     return squares
 
 
-def _hiding(shift: np.ndarray, sharpening: np.ndarray, narrow: np.ndarray) -> np.ndarray:
-    """Return by how much growth and sharpening hide narrow rings, (k,), which have so many px."""
+def _hiding(
+    shift: np.ndarray, sharpening: np.ndarray, known: np.ndarray, narrow: np.ndarray
+) -> np.ndarray:
+    """Return by how much growth, sharpening and clipping hide narrow rings of so many px, (k,)."""
     grown = _GROWTH_HIDES * (shift / (_MOST_SHIFT * narrow)) ** 8
     sharpened = _SHARPENING_HIDES * sharpening**2 / (1 + np.abs(sharpening))
-    hidden: np.ndarray = grown + sharpened * (_SHARPENED / narrow) ** 2
+    others = sharpened + _CLIPPING_HIDES * (1 - known)
+    hidden: np.ndarray = grown + others * (_SHARPENED / narrow) ** 2
     return hidden
 
 
