@@ -24,7 +24,7 @@ from support.ring import made_up
 
 
 def unlike(image: np.ndarray, name: str) -> np.ndarray:
-    """Return the shares of directions of the dots that were read."""
+    """Return the shares of sectors of the dots that were read."""
     found = find_hypotheses(image, DetectorSettings(family=name))
     return found.unlike[found.words > 0]
 

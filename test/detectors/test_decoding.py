@@ -25,6 +25,7 @@ def seen(marked: np.ndarray, weight: float = 1.0) -> Evidence:
         paper=np.where(halves, absent, there),
         ink=np.where(halves, there, absent),
         between=np.zeros((count, 2, 0, marked.shape[1]), np.float32),
+        sharp=np.zeros((count, 2, 0, marked.shape[1]), np.float32),
         weight=np.full(count, weight, np.float32),
         dot=np.zeros(count, np.float32),
         lit=np.full(count, SURPRISES[0], np.float32),
