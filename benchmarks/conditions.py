@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ahf_ros.codes.ring import FAMILY_NAMES, family
+from ahf_ros.codes.ring import FAMILY_NAMES, family, ring_family
 from ahf_ros.detectors import DetectorSettings
 from ahf_ros.synthetic.patterns import LIGHT_NAMES, benchmark_lights
 from ahf_ros.synthetic.scene import SceneSettings, render
@@ -33,10 +33,13 @@ SHADOWS = (0.3, 0.08, 0.04, 0.02)
 GRAYS = (61.0, 75.0, 105.0, 150.0, 190.0, 220.0)
 """Gray values of what covers targets, from ink to paper."""
 
-DRAWN = 8
+DRAWN = 12
 """Families that are drawn for each light."""
 
-SMALL = (5.0, 10.0)
+FEW = 9
+"""Largest number of sectors of every other one of these."""
+
+SMALL = (5.0, 20.0)
 """Smallest and largest radius of dots of these, px."""
 
 CELLS = COLUMNS * ROWS
@@ -106,14 +109,19 @@ def lit(seed: int) -> Iterator[SceneSettings]:
 
 
 def drawn(seed: int) -> Iterator[Scene]:
-    """Yield scenes of families drawn at random, most of them of few words, with small dots."""
+    """Yield scenes of families drawn at random, of few words; every other one has few sectors.
+
+    Few sectors have words of a single mark, which a spot of light shows as well.
+    """
     generator = np.random.default_rng([seed, 7])
     with TemporaryDirectory() as folder:
         for index, light in enumerate(LIGHTS * DRAWN):
             file = Path(folder, f'{index}.json')
             random_family(file, generator)
+            while index % 2 and ring_family(str(file)).bits > FEW:
+                random_family(file, generator)
             values = {
-                'dot_radius': float(generator.uniform(*SMALL)),
+                'dot_radius': float(np.exp(generator.uniform(*np.log(SMALL)))),
                 'edge_shift': float(generator.uniform(-0.5, 0.5)),
                 'polarity': str(generator.choice(['dark', 'bright'])),
             }

@@ -1,8 +1,9 @@
 """Whether targets look like the print of their words, where light is even about them.
 
-Where the ground beyond a band is even, so is the light on the target, and all of it is paper or
-ink. What covers a target without reaching beyond it hides a small part of its directions. A
-print with other radii or with two bands is another one nearly all round.
+Where the ground beyond a band is even, and its light makes ink as dark as the dot is, the light on
+the target is even, and all of it is paper or ink. What covers a target without reaching beyond it
+hides a small part of its directions. A print with other radii or with two bands is another one
+nearly all round.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from ahf_ros.features.robust import median
 from ahf_ros.imaging.logarithm import LOG_OFFSET
 
 _BLURRED, _MINIMUM_BLURRED = 1.6, 1.0  # distance from an edge at which it ends: blurs, and px
+_INMOST = 0.5  # of the dot, whose ink is that of marks where light is even, dot radii
 _BEYOND = 0.2, 0.7  # the ground beyond a band, dot radii
 _ASIDE = 0.25  # distance from further circles, dot radii
 _EVEN, _UNEVEN = 0.3, 0.03  # of the step of ink that even paper keeps within; share that may not
@@ -56,6 +58,8 @@ def unlike_print(
     step = _step_shares(polar, ground)
     uneven = (np.abs(step) > _EVEN) & ground
     even = uneven.sum(axis=(1, 2)) < _UNEVEN * ground.sum(axis=(1, 2))
+    of_dot = step[..., (radii < _INMOST).all(axis=0)].mean(axis=(1, 2))
+    even &= np.abs(of_dot - 1) < _EVEN
     lost, stray = (
         np.count_nonzero(of, axis=2) >= _READINGS
         for of in (ink & (step < _UNLIKE), paper & (step > _EVEN))
