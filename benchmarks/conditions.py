@@ -9,11 +9,14 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from functools import partial
 from itertools import product
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import NamedTuple
 
 import numpy as np
 
-from ahf_ros.codes.ring import FAMILY_NAMES, family
+from ahf_ros.codes.ring import FAMILY_NAMES, family, ring_family
+from ahf_ros.detectors import DetectorSettings
 from ahf_ros.synthetic.patterns import LIGHT_NAMES, benchmark_lights
 from ahf_ros.synthetic.scene import SceneSettings, render
 from ahf_ros.target import Target, TrueTarget
@@ -21,6 +24,7 @@ from benchmarks import occluders
 from benchmarks.disturbed import blurred, compressed, noisy, overlapping
 from benchmarks.exposure import Exposure
 from benchmarks.lookalikes import LOOKALIKES
+from benchmarks.random_families import LIGHTS, TARGETS, random_family, sheet
 from benchmarks.sheets import COLUMNS, ROWS, mark_sheet, random_numbers, target_sheet
 
 SHADOWS = (0.3, 0.08, 0.04, 0.02)
@@ -29,10 +33,19 @@ SHADOWS = (0.3, 0.08, 0.04, 0.02)
 GRAYS = (61.0, 75.0, 105.0, 150.0, 190.0, 220.0)
 """Gray values of what covers targets, from ink to paper."""
 
+DRAWN = 12
+"""Families that are drawn for each light."""
+
+FEW = 9
+"""Largest number of sectors of every other one of these."""
+
+SMALL = (5.0, 20.0)
+"""Smallest and largest radius of dots of these, px."""
+
 CELLS = COLUMNS * ROWS
 
 
-COMMON = ('light', 'clean', 'exposure', 'quality')
+COMMON = ('light', 'drawn family', 'clean', 'exposure', 'quality')
 """Conditions that most targets are under; the others are rare."""
 
 
@@ -47,6 +60,8 @@ class Scene(NamedTuple):
     family : str
     others : bool
         Whether the image shows other targets of the family as well.
+    file : Path or None
+        Data file of the family.
     """
 
     condition: str
@@ -54,6 +69,12 @@ class Scene(NamedTuple):
     truth: Sequence[TrueTarget | Target]
     family: str
     others: bool = False
+    file: Path | None = None
+
+    @property
+    def settings(self) -> DetectorSettings:
+        """Settings with the family that it is read as."""
+        return DetectorSettings(family=self.family, family_file=str(self.file or ''))
 
 
 def scenes(seed: int) -> Iterator[Scene]:
@@ -61,6 +82,7 @@ def scenes(seed: int) -> Iterator[Scene]:
     for settings in lit(seed):
         rendering = render(settings)
         yield Scene('light', rendering.image, rendering.targets, settings.family)
+    yield from drawn(seed)
     yield from disturbed(seed)
     yield from strange(seed)
 
@@ -84,6 +106,27 @@ def lit(seed: int) -> Iterator[SceneSettings]:
             ambient=ambient,
             seed=seed,
         )
+
+
+def drawn(seed: int) -> Iterator[Scene]:
+    """Yield scenes of families drawn at random, of few words; every other one has few sectors.
+
+    Few sectors have words of a single mark, which a spot of light shows as well.
+    """
+    generator = np.random.default_rng([seed, 7])
+    with TemporaryDirectory() as folder:
+        for index, light in enumerate(LIGHTS * DRAWN):
+            file = Path(folder, f'{index}.json')
+            random_family(file, generator)
+            while index % 2 and ring_family(str(file)).bits > FEW:
+                random_family(file, generator)
+            values = {
+                'dot_radius': float(np.exp(generator.uniform(*np.log(SMALL)))),
+                'edge_shift': float(generator.uniform(-0.5, 0.5)),
+                'polarity': str(generator.choice(['dark', 'bright'])),
+            }
+            shown = sheet(file, TARGETS, light, seed, values)
+            yield Scene('drawn family', shown.image, shown.targets, 'mine', file=file)
 
 
 def exposures() -> Iterator[tuple[str, Exposure]]:

@@ -16,8 +16,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ahf_ros.codes.ring import canonical, family
-from ahf_ros.detectors.contract import DetectorSettings
+from ahf_ros.codes.ring import Family, canonical
 from ahf_ros.detectors.ring.confidence import WEIGHTS, confidence, features
 from ahf_ros.detectors.ring.detector import find_hypotheses
 from ahf_ros.imaging.image import as_gray
@@ -27,7 +26,7 @@ from benchmarks.reliability import NEAR, Parts, gathered, reliability_table, run
 COVERED = ('cover', 'cover like paper', 'another target')
 """Conditions under which something lies on targets."""
 
-MARGIN, CODED, VISIBLE = 0, 1, 3
+MARGIN, CODED = 0, 1
 """Places of some features."""
 
 RARE = 0.3
@@ -37,14 +36,14 @@ _PRIOR = 1.0  # inverse variance of scaled weights
 _ITERATIONS = 3000
 _NO_SPREAD = 1e-9
 _MINIMUM_MARGIN = np.log1p(2.0)  # of readings that count: others are not certain in any case
-_WHOLE, _TRACE = 0.97, -2.2  # share of the band that is seen, and feature of arcs, without a trace
+_HIDDEN, _TRACE = 0.03, -2.2  # share of the band, and feature of arcs, without a trace of covers
 
 
 def readings(seed: int) -> Parts:
-    """Yield condition, features and rightness of all plausible readings of each scene."""
+    """Yield condition, features, rightness and covers of all plausible readings of each scene."""
     for scene in scenes(seed):
-        code = family(scene.family)
-        read = find_hypotheses(as_gray(scene.image), DetectorSettings(family=code.name))
+        code = scene.settings.codes(Family)[0]
+        read = find_hypotheses(as_gray(scene.image), scene.settings)
         read = read.select(read.words > 0)
         _, ids = canonical(read.words, code)
         true = [(target.x, target.y, target.id) for target in scene.truth]
@@ -53,7 +52,7 @@ def readings(seed: int) -> Parts:
         right = (near & (ids[:, None] == number)).any(axis=1)
         seen = near.any(axis=1) | (not scene.others)
         condition = np.full(seen.sum(), scene.condition)
-        yield condition, features(read.select(seen)), right[seen]
+        yield condition, features(read.select(seen)), right[seen], read.hidden[seen]
 
 
 def rising_regression(
@@ -91,9 +90,9 @@ def rising_regression(
 
 def fitted(seeds: Sequence[int]) -> dict[str, np.ndarray]:
     """Return the numbers of the regression on the scenes of some seeds, by their names."""
-    condition, values, right = gathered(readings, seeds)
+    condition, values, right, hidden = gathered(readings, seeds)
     # A cover without a trace cannot be told.
-    no_trace = ~right & np.isin(condition, COVERED) & (values[:, VISIBLE] > _WHOLE)
+    no_trace = ~right & np.isin(condition, COVERED) & (hidden < _HIDDEN)
     no_trace &= values[:, CODED] > _TRACE
     told = (values[:, MARGIN] > _MINIMUM_MARGIN) & ~no_trace
     counts = np.where(np.isin(condition, COMMON), 1.0, RARE)[told]
@@ -103,7 +102,7 @@ def fitted(seeds: Sequence[int]) -> dict[str, np.ndarray]:
 
 def reliability(seeds: Sequence[int]) -> list[str]:
     """Return the lines of the table of the scenes of some seeds."""
-    condition, values, right = gathered(readings, seeds)
+    condition, values, right, _ = gathered(readings, seeds)
     return reliability_table(condition, confidence(values), right)
 
 

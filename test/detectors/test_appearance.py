@@ -14,6 +14,7 @@ from ahf_ros.detectors.ring.confidence import COVERED
 from ahf_ros.detectors.ring.decoding import Words
 from ahf_ros.detectors.ring.detector import find_hypotheses
 from ahf_ros.detectors.ring.polar import polar_images
+from ahf_ros.synthetic.covers import Cover, ring_cover
 from ahf_ros.synthetic.scene import SceneSettings, render
 from benchmarks import occluders
 from benchmarks.disturbed import Targets
@@ -24,7 +25,7 @@ from support.ring import made_up
 
 
 def unlike(image: np.ndarray, name: str) -> np.ndarray:
-    """Return the shares of directions of the dots that were read."""
+    """Return the shares of sectors of the dots that were read."""
     found = find_hypotheses(image, DetectorSettings(family=name))
     return found.unlike[found.words > 0]
 
@@ -45,6 +46,32 @@ def test_other_prints_are_others_all_round() -> None:
     found = unlike(mark_sheet(inks, 5).photograph(Exposure()), 'aicon12')
     assert len(found) > 12
     assert np.median(found) > COVERED
+
+
+def test_a_rim_between_all_marks_is_of_another_print() -> None:
+    code = family('metashape12')
+    rim = replace(code, band_inner=2.0, band_outer=2.2)
+
+    def ink(turn: float) -> Cover:
+        marks, round_them = (
+            ring_cover(code, code.word(146), turn, 0.05),
+            ring_cover(rim, 4095, turn, 0.05),
+        )
+        return lambda *place: np.maximum(marks(*place), round_them(*place))
+
+    found = unlike(mark_sheet([ink] * 9, 5).photograph(Exposure()), code.name)
+    assert len(found) >= 6
+    assert np.median(found) > COVERED
+
+
+def test_light_that_ends_between_dot_and_band_tells_nothing() -> None:
+    (sheet,) = Targets('metashape12', 12, 3).sheets()
+    image = sheet.photograph(Exposure())
+    y, x = np.mgrid[: image.shape[0], : image.shape[1]]
+    away = np.min([np.hypot(x - of.x, y - of.y) for of in sheet.truth], axis=0)
+    lit = np.where(away < 1.6 * sheet.radius, image, 0.3 * image).astype(np.uint8)
+    found = find_hypotheses(lit, DetectorSettings(family='metashape12'))
+    assert len(found.words) and not found.unlike.any()
 
 
 def test_blur_that_leaves_no_ground_tells_nothing() -> None:

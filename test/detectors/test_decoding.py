@@ -25,6 +25,7 @@ def seen(marked: np.ndarray, weight: float = 1.0) -> Evidence:
         paper=np.where(halves, absent, there),
         ink=np.where(halves, there, absent),
         between=np.zeros((count, 2, 0, marked.shape[1]), np.float32),
+        sharp=np.zeros((count, 2, 0, marked.shape[1]), np.float32),
         weight=np.full(count, weight, np.float32),
         dot=np.zeros(count, np.float32),
         lit=np.full(count, SURPRISES[0], np.float32),
@@ -180,3 +181,12 @@ def test_no_band_no_word() -> None:
     found = read(seen(np.zeros((0, ANGLES), bool)))
     assert found.words.shape == found.margin.shape == (0,)
     assert found.hidden.shape == (0, ANGLES)
+
+
+def test_sharp_edges_of_all_marks_and_of_all_paper_would_give_more() -> None:
+    clear = seen(WORD)
+    paper, ink = np.full_like(clear.paper, 0.5), np.full_like(clear.ink, 1.0)  # of either half
+    found = read(replace(clear, sharp=np.stack([paper, ink], axis=2)))
+    of_angles = np.where(WORD, 2.0, 1.0)
+    assert found.sharp == pytest.approx((5 * np.tanh(of_angles / 5)).sum(), rel=0.02)
+    assert not read(clear).sharp.any()  # where no edges were given

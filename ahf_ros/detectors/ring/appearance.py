@@ -1,8 +1,9 @@
 """Whether targets look like the print of their words, where light is even about them.
 
-Where the ground beyond a band is even, so is the light on the target, and all of it is paper or
-ink. What covers a target without reaching beyond it hides a small part of its directions. A
-print with other radii or with two bands is another one nearly all round.
+Where the ground beyond a band is even, and its light makes ink as dark as the dot is, the light on
+the target is even, and all of it is paper or ink. What covers a target without reaching beyond it
+hides a small part of its directions. A print with other radii or with two bands is another one
+nearly all round.
 """
 
 from __future__ import annotations
@@ -17,24 +18,26 @@ from ahf_ros.features.robust import median
 from ahf_ros.imaging.logarithm import LOG_OFFSET
 
 _BLURRED, _MINIMUM_BLURRED = 1.6, 1.0  # distance from an edge at which it ends: blurs, and px
+_INMOST = 0.5  # of the dot, whose ink is that of marks where light is even, dot radii
 _BEYOND = 0.2, 0.7  # the ground beyond a band, dot radii
 _ASIDE = 0.25  # distance from further circles, dot radii
-_EVEN, _UNEVEN = 0.3, 0.03  # of the step of ink that even ground keeps within; share that may not
-_UNLIKE = 0.5  # of that step, from which paper is ink, and up to which ink is paper
+_EVEN, _UNEVEN = 0.3, 0.03  # of the step of ink that even paper keeps within; share that may not
+_UNLIKE = 0.5  # of that step, up to which ink is paper
 _READINGS = 2  # in one direction, which are no noise
-_OF_MARKS = 1 / 3  # of all directions, that are as unlike as all marks
+_OF_MARKS = 1 / 3  # of all sectors, that are as unlike as all marks
 
 
 def unlike_print(
     polar: PolarImages, words: Words, growth: np.ndarray, overhang: np.ndarray, family: Family
 ) -> np.ndarray:
-    """Return the shares of directions in which targets are not what their words print, (k,).
+    """Return the shares of sectors in which targets are not what their words print, (k,).
 
-    Where few are marked, a third of the share of these counts. All are 0 where light is uneven.
+    Of a sector, the directions away from its borders count. Where few are marked, a third of the
+    share of these counts. All are 0 where light is uneven.
     `growth`, shape (k,), is that of ink in dot radii, and `overhang` by how many angles this makes
     arcs longer at either end.
     """
-    count, (inner, outer) = words.hidden.shape[1], family.band
+    (number, count), (inner, outer) = words.hidden.shape, family.band
     radii, about = polar.radii, (growth, inner - growth, outer + growth)
     dot, inside, outside = (of[:, None] for of in about)
     aside = (np.maximum(_BLURRED * polar.blur, _MINIMUM_BLURRED) / polar.size)[:, None]
@@ -47,20 +50,30 @@ def unlike_print(
     phases = np.rint(words.starts * count / (2 * np.pi)).astype(int)
     marked = bits_at(words.words, phases, count // family.bits, family)
     away = aside[:, 0] * count / (np.pi * (inner + outer)) + 1
-    ink = lengthened(marked, overhang - away)[..., None] & deep[:, None] & visible
+    inked = lengthened(marked, overhang - away)
+    ink = inked[..., None] & deep[:, None] & visible
     unmarked = ~lengthened(marked, overhang + away)
     paper = ((gap | beyond)[:, None] | (unmarked[..., None] & near[:, None])) & visible
     ground = np.broadcast_to(beyond[:, None] & visible, polar.gray.shape)
     step = _step_shares(polar, ground)
     uneven = (np.abs(step) > _EVEN) & ground
     even = uneven.sum(axis=(1, 2)) < _UNEVEN * ground.sum(axis=(1, 2))
+    of_dot = step[..., (radii < _INMOST).all(axis=0)].mean(axis=(1, 2))
+    even &= np.abs(of_dot - 1) < _EVEN
     lost, stray = (
         np.count_nonzero(of, axis=2) >= _READINGS
-        for of in (ink & (step < _UNLIKE), paper & (step > _UNLIKE))
+        for of in (ink & (step < _UNLIKE), paper & (step > _EVEN))
     )
     printed = np.maximum(np.count_nonzero(ink.any(axis=2), axis=1), 1)
     of_marks = np.count_nonzero(lost, axis=1) / printed
-    unlike = np.maximum((lost | stray).mean(axis=1), _OF_MARKS * of_marks)
+    places = (phases[:, None] + np.arange(count)) % count
+    sectors = number, family.bits, count // family.bits
+    differ, told = (
+        np.take_along_axis(of, places, axis=1).reshape(sectors).sum(axis=2)
+        for of in (lost | stray, inked | unmarked)
+    )
+    of_sectors = np.minimum(differ, told) / np.maximum(told, 1)
+    unlike = np.maximum(of_sectors.mean(axis=1), _OF_MARKS * of_marks)
     return np.where(even, unlike, 0.0)
 
 

@@ -62,8 +62,10 @@ class Words(ArrayRecord):
         Log odds of these against the word and what covers it.
     seen : ndarray of float64, shape (k,)
         Log odds of the word, where it is not covered, against anything.
+    sharp : ndarray of float64, shape (k,)
+        The same, if all marks and all paper looked as they should.
     unlike : ndarray of float64, shape (k,)
-        Share of directions in which targets are not what their words print, see `appearance`.
+        Share of sectors in which targets are not what their words print, see `appearance`.
     hidden : ndarray of bool, shape (k, m)
         Where something covers the band.
     """
@@ -77,6 +79,7 @@ class Words(ArrayRecord):
     other: np.ndarray
     ahead: np.ndarray
     seen: np.ndarray
+    sharp: np.ndarray
     unlike: np.ndarray
     hidden: np.ndarray
 
@@ -97,6 +100,7 @@ class Words(ArrayRecord):
             other=np.zeros(count, np.int64),
             ahead=np.zeros(count),
             seen=np.zeros(count),
+            sharp=np.zeros(count),
             unlike=np.zeros(count),
             hidden=np.zeros((count, angles), bool),
         )
@@ -181,6 +185,7 @@ def decode(
         other=other,
         ahead=of_other[:, 0] - score,
         seen=score,
+        sharp=_if_sharp(some, of_best_word[0], hidden),
         unlike=np.zeros(len(read)),
         hidden=hidden,
     )
@@ -197,7 +202,17 @@ def _doubted(evidence: Evidence) -> Evidence:
         for of in (evidence.paper, evidence.ink, evidence.between)
     )
     between = _unsure(np.concatenate([paper[:, None], between, ink[:, None]], axis=1), evidence)
-    return replace(evidence, paper=paper, ink=ink, between=between)
+    sharp = _bounded(evidence.sharp.sum(axis=1), evidence)
+    return replace(evidence, paper=paper, ink=ink, between=between, sharp=sharp)
+
+
+def _if_sharp(evidence: Evidence, inked: np.ndarray, hidden: np.ndarray) -> np.ndarray:
+    """Return what words would have that look as they should, from ink and covers (k, m), (k,)."""
+    if not evidence.sharp.shape[1]:
+        return np.zeros(len(inked))
+    paper, ink = evidence.sharp.transpose(1, 0, 2)
+    of_angles = np.where(hidden, 0, np.where(inked, ink, paper))
+    return np.asarray(of_angles.sum(axis=1, dtype=np.float64))
 
 
 def _unsure(every: np.ndarray, evidence: Evidence) -> np.ndarray:

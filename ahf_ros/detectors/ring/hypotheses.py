@@ -47,7 +47,7 @@ class Hypotheses(ArrayRecord):
         In the rotation read; 0 where there is none.
     starts : ndarray of float64, shape (k,)
         Where in the frame the sector of the lowest bit starts, rad counter-clockwise from +x.
-    margin, marked, coded, ends, seen, unlike : ndarray of float64, shape (k,)
+    margin, marked, coded, ends, seen, sharp, unlike : ndarray of float64, shape (k,)
         Log odds of the word and looks of its print, see `ahf_ros.detectors.ring.decoding.Words`.
     hidden : ndarray of float64, shape (k,)
         Share of the band that something covers.
@@ -71,6 +71,7 @@ class Hypotheses(ArrayRecord):
     coded: np.ndarray
     ends: np.ndarray
     seen: np.ndarray
+    sharp: np.ndarray
     unlike: np.ndarray
     hidden: np.ndarray
     families: np.ndarray
@@ -123,6 +124,7 @@ class Hypotheses(ArrayRecord):
             coded=words.coded,
             ends=words.ends,
             seen=words.seen,
+            sharp=words.sharp,
             unlike=words.unlike,
             hidden=words.hidden.mean(axis=1),
             families=np.full(len(words.words), family, object),

@@ -67,8 +67,11 @@ class Evidence(ArrayRecord):
         Where the band is unmarked, and where it is marked.
     between : ndarray of float32, shape (k, 2, s, m)
         Where blur mixes both, for shares of ink in equal steps from paper to ink; s may be 0.
+    sharp : ndarray of float32, shape (k, 2, 2, m)
+        What edges of paper and of ink would give where these look as they should; only where
+        shares of ink are asked for.
     weight : ndarray of float32, shape (k,)
-        Of a reading, which is part of both; less than 1 where neighbours tell the same.
+        Of a reading, which is part of all; less than 1 where neighbours tell the same.
     dot : ndarray of float32, shape (k,)
         Of the dot as ink, over the dot as light on paper.
     lit : ndarray of float32, shape (k,)
@@ -82,6 +85,7 @@ class Evidence(ArrayRecord):
     paper: np.ndarray
     ink: np.ndarray
     between: np.ndarray
+    sharp: np.ndarray
     weight: np.ndarray
     dot: np.ndarray
     lit: np.ndarray
@@ -102,6 +106,7 @@ class Evidence(ArrayRecord):
             ink=np.where(self.covered, 0, self.ink) + np.where(across, 0, levels.ink),
             between=np.where(self.covered[:, :, None], 0, self.between)
             + np.where(across[:, :, None], 0, levels.between),
+            sharp=self.sharp,
             weight=self.weight,
             dot=self.dot + levels.dot,
             lit=np.maximum(self.lit, levels.lit),
@@ -164,6 +169,7 @@ def edge_evidence(
     ]
     lit_ground = np.maximum(ground, polar.paper(ground, marked[0]))
     paper, ink, *between = _step_evidence(polar, inside, ground, edges, bare, marked, shares)
+    between, sharp = between[: len(shares)], between[len(shares) :]
     weight = weights(polar)
     visible = polar.reach[:, None] >= np.stack([inner + within, outer + beside], axis=1)[..., None]
     share = weight[:, None, None] * visible
@@ -171,6 +177,7 @@ def edge_evidence(
         paper=paper * share,
         ink=ink * share,
         between=_stacked(between, ink) * share[:, :, None],
+        sharp=_stacked(sharp, ink) * share[:, :, None],
         weight=weight,
         dot=np.zeros_like(weight),
         lit=edges.astype(np.float32),
@@ -261,7 +268,8 @@ def _step_evidence(
     limit = polar.glare[:, None, None]
     glare, white = ground >= limit, np.minimum(*ground.swapaxes(0, 1))[:, None] >= SATURATED
     flat = np.where(white & (limit <= SATURATED), np.float32(_WHITE), np.float32(_FLAT))
-    flat = normal(level - polar.logs(blank)[0], np.sqrt(flat**2 + noise**2 + of_ground**2))
+    spread = np.sqrt(flat**2 + noise**2 + of_ground**2)
+    flat = normal(level - polar.logs(blank)[0], spread)
     more = (step - mark) * np.sign(mark)
     expected = of_ground * _gain(ground, ink)
     low, high = (np.sqrt(spread**2 + noise**2 + expected**2) for spread in (_MARK, _MARK_TAIL))
@@ -280,11 +288,19 @@ def _step_evidence(
         mixed = polar.printed(polar.paper(ground, on_ground), on_band, band)
         width = np.sqrt(_MARK**2 + (_SHARE * mark) ** 2 + noise**2 + expected**2)
         densities.append(normal(level - polar.logs(mixed)[0], width))
-    anything = _PLAIN * flat + (1 - _PLAIN) * _ANY
+    plain = [flat] * len(densities)
+    if shares:
+        zero = np.zeros_like(spread)
+        densities += [normal(zero, spread), normal(zero, (low + high) / 2)]
+        plain += [normal(zero, spread), normal(mark, spread)]
     clear = polar.tells(band)
     return [
-        np.where(clear, np.log(((1 - lit) * density + lit * _ANY) / anything), 0)
-        for density in densities
+        np.where(
+            clear,
+            np.log(((1 - lit) * density + lit * _ANY) / (_PLAIN * of + (1 - _PLAIN) * _ANY)),
+            0,
+        )
+        for density, of in zip(densities, plain, strict=True)
     ]
 
 
@@ -354,6 +370,7 @@ def level_evidence(
         paper=of_halves[0],
         ink=of_halves[1],
         between=_stacked(of_halves[2:], of_halves[1]),
+        sharp=_stacked([], of_halves[1]),
         weight=weight,
         dot=(ink - paper)[..., in_dot].sum(axis=(1, 2)),
         lit=surprise[:, 0, 0].astype(np.float32),

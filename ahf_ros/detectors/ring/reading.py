@@ -161,7 +161,9 @@ def _settled(
     of_all = decode(evidence, _overhang(growth, family), family, expected)
     hidden = of_all.hidden | (polar.reach < of_band[0])
     # What speaks against no target is that of edges, so that all targets compare.
-    return words.replaced(some, replace(of_all, seen=words.seen[some], hidden=hidden))
+    of_edges = words.select(some)
+    of_all = replace(of_all, seen=of_edges.seen, sharp=of_edges.sharp, hidden=hidden)
+    return words.replaced(some, of_all)
 
 
 def _thin(printed: Fit, growth: np.ndarray, family: Family) -> np.ndarray:
