@@ -48,6 +48,9 @@ CELLS = COLUMNS * ROWS
 COMMON = ('light', 'drawn family', 'clean', 'exposure', 'quality')
 """Conditions that most targets are under; the others are rare."""
 
+FOREIGN = ('other family', 'look-alikes', 'clutter')
+"""Conditions without a target of the family that is read."""
+
 
 class Scene(NamedTuple):
     """An image, what it shows, and the family that it is read as.

@@ -20,7 +20,7 @@ from ahf_ros.codes.ring import Family, canonical
 from ahf_ros.detectors.ring.confidence import WEIGHTS, confidence, features
 from ahf_ros.detectors.ring.detector import find_hypotheses
 from ahf_ros.imaging.image import as_gray
-from benchmarks.conditions import COMMON, scenes
+from benchmarks.conditions import COMMON, FOREIGN, scenes
 from benchmarks.reliability import NEAR, Parts, gathered, reliability_table, run
 
 COVERED = ('cover', 'cover like paper', 'another target')
@@ -30,7 +30,7 @@ MARGIN, CODED = 0, 1
 """Places of some features."""
 
 RARE = 0.3
-"""Weight of a reading under a condition that is not common, in the fit."""
+"""Weight of a reading of a target under a condition that is not common, in the fit."""
 
 _PRIOR = 1.0  # inverse variance of scaled weights
 _ITERATIONS = 3000
@@ -95,7 +95,7 @@ def fitted(seeds: Sequence[int]) -> dict[str, np.ndarray]:
     no_trace = ~right & np.isin(condition, COVERED) & (hidden < _HIDDEN)
     no_trace &= values[:, CODED] > _TRACE
     told = (values[:, MARGIN] > _MINIMUM_MARGIN) & ~no_trace
-    counts = np.where(np.isin(condition, COMMON), 1.0, RARE)[told]
+    counts = np.where(np.isin(condition, COMMON + FOREIGN), 1.0, RARE)[told]
     intercept, weights = rising_regression(values[told], right[told], counts)
     return {'intercept': np.round([intercept], 3), 'weights': np.round(weights, 3)}
 
