@@ -24,9 +24,13 @@ from benchmarks.sheets import mark_sheet
 from support.ring import made_up
 
 
+LEAST = 8.0
+"""Radius of dots, px, less than that of the sheets and scenes."""
+
+
 def unlike(image: np.ndarray, name: str) -> np.ndarray:
-    """Return the shares of sectors of the dots that were read."""
-    found = find_hypotheses(image, DetectorSettings(family=name))
+    """Return the shares of sectors of the dots that were read; parts of marks are no dots."""
+    found = find_hypotheses(image, DetectorSettings(family=name, min_radius=LEAST))
     return found.unlike[found.words > 0]
 
 
