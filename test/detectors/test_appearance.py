@@ -14,6 +14,7 @@ from ahf_ros.detectors.ring.confidence import COVERED
 from ahf_ros.detectors.ring.decoding import Words
 from ahf_ros.detectors.ring.detector import find_hypotheses
 from ahf_ros.detectors.ring.polar import polar_images
+from ahf_ros.features.frame import ellipse_axes
 from ahf_ros.synthetic.covers import Cover, ring_cover
 from ahf_ros.synthetic.scene import SceneSettings, render
 from benchmarks import occluders
@@ -24,14 +25,15 @@ from benchmarks.sheets import mark_sheet
 from support.ring import made_up
 
 
-LEAST = 8.0
-"""Radius of dots, px, less than that of the sheets and scenes."""
+LEAST = 6.0
+"""Semi-minor axis of dots, px, less than those of the sheets and scenes."""
 
 
 def unlike(image: np.ndarray, name: str) -> np.ndarray:
     """Return the shares of sectors of the dots that were read; parts of marks are no dots."""
-    found = find_hypotheses(image, DetectorSettings(family=name, min_radius=LEAST))
-    return found.unlike[found.words > 0]
+    found = find_hypotheses(image, DetectorSettings(family=name))
+    dots = ellipse_axes(found.frames)[1] > LEAST
+    return found.unlike[dots & (found.words > 0)]
 
 
 @pytest.mark.parametrize('name', ['metashape12', 'aicon14'])
