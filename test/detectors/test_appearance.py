@@ -24,7 +24,6 @@ from benchmarks.lookalikes import LOOKALIKES
 from benchmarks.sheets import mark_sheet
 from support.ring import made_up
 
-
 LEAST = 6.0
 """Semi-minor axis of dots, px, less than those of the sheets and scenes."""
 
