@@ -34,9 +34,9 @@ def shown(**changes: object) -> np.ndarray:
         ({}, {'family': 'apriltag_36h11'}, ['12 dots with a band of 12 sectors: --family met']),
         ({'targets': 2}, {'family': 'aicon14'}, ['2 targets of metashape12: --family met']),
         (
-            {'family': 'aicon12', 'targets': 2},
+            {'family': 'aicon12', 'targets': 3},
             {'family': 'aicon12,cct12'},
-            ['2 targets of aicon12 or cct12: --family says which'],
+            ['3 targets of aicon12 or cct12: --family says which'],
         ),
         ({'dot_radius': 3.4}, {}, [r'1[012] dots of 3\.\d px are too small: 5 px would do']),
         ({'dot_radius': 3}, {'family': 'auto'}, [r'\d+ dots of 2\.\d px are too small: 5 px']),
