@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import cv2
 import numpy as np
 import pytest
 
@@ -53,6 +54,14 @@ def test_targets_are_identified_where_they_are(family: str, changes: dict, limit
     assert counted(shown, found) == (count, 0, 0)
     assert np.sqrt((errors(shown, found) ** 2).mean()) < limit
     assert all(target.code == target.id and target.family == family for target in found)
+
+
+def test_targets_are_read_out_of_focus() -> None:
+    shown = scene(dot_radius=60.0, targets=4, width=760, height=640, seed=3)
+    radii = np.hypot(*np.mgrid[-7:8, -7:8])
+    disc = np.clip(5.5 - radii, 0, 1)
+    image = cv2.filter2D(shown.image, -1, disc / disc.sum())
+    assert counted(shown, create_detector(family='cctag3')(image)) == (4, 0, 0)
 
 
 @pytest.mark.parametrize('family', CCTAG_NAMES)
