@@ -22,9 +22,10 @@ from ahf_ros.codes.ring import FAMILY_NAMES, Family, family, words_of_print
 from ahf_ros.detectors import create_detector
 from ahf_ros.detectors.contract import DetectorSettings
 from ahf_ros.detectors.ring.learning import LearntFamily, find_bands, learn_families
+from ahf_ros.doubt import repeated_remark
 from ahf_ros.edge_shift import edge_shift_remark, median_edge_shift
 from ahf_ros.filtering.settling import evident
-from ahf_ros.target import UNDECODED, Target, UndecodedTarget
+from ahf_ros.target import UNDECODED, Target, UndecodedTarget, repeated_targets
 from ahf_ros.text import counted
 
 LOOKED_AT = 3
@@ -38,7 +39,6 @@ _MAXIMUM_PIXELS = 2**23  # of an image that is enlarged; the middle of a larger 
 _AMPLE = 1.25  # times the minimum radius, which even light needs
 _SURE = 10.0  # log odds of the number of sectors
 _MISPLACED = 1.5  # px, growth of ink that leaves a doubt of the radii of a band
-_NAMED = 3  # IDs that several targets have, of which the commonest are named
 _EXACT = 0.02  # dot radii, spread of the edges of bands that light does not blur
 
 
@@ -88,8 +88,8 @@ class Adviser:
 
 
 def _lines(image: np.ndarray, settings: DetectorSettings, expected: int) -> Iterator[str]:
-    if repeated := list(_of_repeated_ids(image, settings)):
-        yield from repeated
+    if repeated := _repeated(image, settings):
+        yield repeated_remark(repeated)
         return
     if learnt := _learnt(image):
         yield from _of_bands(learnt, 1, settings, expected)
@@ -113,16 +113,11 @@ def _lines(image: np.ndarray, settings: DetectorSettings, expected: int) -> Iter
         yield _of_size(len(small), radius, settings.narrowed({it.family for it in small}))
 
 
-def _of_repeated_ids(image: np.ndarray, settings: DetectorSettings) -> Iterator[str]:
-    """Yield which IDs are read in several places, so that none of these is reported."""
-    found: list[Target] = []
+def _repeated(image: np.ndarray, settings: DetectorSettings) -> tuple[UndecodedTarget, ...]:
+    """Return the targets whose IDs are read in several places, so that none is reported."""
     with suppress(ValueError):  # which the identification has said
-        found = create_detector(settings=replace(settings, report_undecoded=True))(image)
-    read = [it for it in found if isinstance(it, UndecodedTarget) and it.reason == 'contested']
-    counts = Counter((it.likely_family, it.likely_id) for it in read)
-    for (name, number), count in counts.most_common(_NAMED):
-        if count > 1:
-            yield f'{count} targets have the ID {number} of {name}: print each ID once'
+        return repeated_targets(create_detector(settings=settings)(image))
+    return ()
 
 
 def _of_shared_prints(image: np.ndarray, settings: DetectorSettings) -> Iterator[str]:

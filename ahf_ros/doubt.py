@@ -1,8 +1,12 @@
-"""Why targets are reported whose confidence is lower than usual."""
+"""Why targets are reported whose confidence is low, and others are not that are certain."""
 
 from __future__ import annotations
 
-from ahf_ros.target import UNDECODED, Target
+from collections import Counter
+from collections.abc import Sequence
+
+from ahf_ros.target import UNDECODED, Target, UndecodedTarget
+from ahf_ros.text import listed
 
 DOUBTFUL_BELOW = 0.95
 """Confidence below which a decoded target counts as doubtful."""
@@ -27,3 +31,20 @@ def doubt(target: Target, detector: str) -> str:
     if target.id == UNDECODED or target.confidence >= DOUBTFUL_BELOW:
         return ''
     return _MEANING.get(detector, f'{detector} sets a lower limit of its own')
+
+
+def repeated_remark(targets: Sequence[UndecodedTarget]) -> str:
+    """Return which IDs several targets have, the commonest first; nothing if there are none.
+
+    Examples
+    --------
+    >>> one = UndecodedTarget(-1, 0, 9.0, 9.0, 8.0, 8.0, likely_id=5, likely_family='a')
+    >>> repeated_remark([one, one])
+    '2 targets share IDs and are not reported, 5 of a (2): print each ID once'
+    """
+    if not targets:
+        return ''
+    counts = Counter((it.likely_id, it.likely_family) for it in targets)
+    order = sorted(counts, key=lambda it: (-counts[it], it))
+    named = listed([f'{number} of {name} ({counts[number, name]})' for number, name in order])
+    return f'{len(targets)} targets share IDs and are not reported, {named}: print each ID once'

@@ -137,6 +137,7 @@ def _identifier(
         draft=used.draft if isinstance(used, Drafter) else None,
         estimate=estimator(settings.detection) if settings.estimate_expected else None,
         interrupt=interrupt,
+        contested=settings.detection.report_undecoded,
         patience=used.patience if isinstance(used, EarlyStopping) else 0,
         mirrored=lambda target: mirrored_number(target.family, target.code),
         name=f'detector {used.name!r}' if isinstance(used, Detector) else 'detector',

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from typing import TYPE_CHECKING, Any, overload
@@ -145,6 +146,11 @@ class UndecodedTarget(Target):
     likely_id: int = UNDECODED
     likely_family: str = ''
 
+    @property
+    def is_contested(self) -> bool:
+        """Whether its code word is certain, and only another target contradicts it."""
+        return self.reason == 'contested'
+
 
 @dataclass(frozen=True, slots=True)
 class TrueTarget:
@@ -277,6 +283,8 @@ class Identification:
         Edge shift of the image, px, as in `Target`; None where it is unknown.
     other_ids : tuple of int
         IDs that were read but are not among `expected_ids`, in ascending order.
+    repeated : tuple of UndecodedTarget
+        Targets whose likely ID others have, too, so that none of them is reported with it.
 
     Examples
     --------
@@ -298,6 +306,7 @@ class Identification:
     search: SearchTrace | None = None
     edge_shift: float | None = None
     other_ids: tuple[int, ...] = ()
+    repeated: tuple[UndecodedTarget, ...] = ()
 
     def __len__(self) -> int:
         """Return the number of targets, undecoded ones included."""
@@ -369,6 +378,13 @@ class Identification:
 def sorted_targets(targets: Iterable[Target]) -> list[Target]:
     """Return targets by ascending ID, then by family, from top to bottom, from left."""
     return sorted(targets, key=lambda target: (target.id, target.family, target.y, target.x))
+
+
+def repeated_targets(targets: Iterable[Target]) -> tuple[UndecodedTarget, ...]:
+    """Return the contested targets that have their likely ID in common with another one."""
+    contested = [it for it in targets if isinstance(it, UndecodedTarget) and it.is_contested]
+    counts = Counter((it.likely_family, it.likely_id) for it in contested)
+    return tuple(it for it in contested if counts[it.likely_family, it.likely_id] > 1)
 
 
 def count_codes(targets: Iterable[Target]) -> int:

@@ -16,7 +16,7 @@ from ahf_ros import ending
 from ahf_ros.batch.engine import Report, no_report
 from ahf_ros.batch.task import ImageOutcome, ImageTask, Level, Message
 from ahf_ros.detectors import Detector, DetectorSettings, create_detector
-from ahf_ros.doubt import doubt
+from ahf_ros.doubt import doubt, repeated_remark
 from ahf_ros.drawing.overlay import draw, summary
 from ahf_ros.edge_shift import edge_shift_remark
 from ahf_ros.filtering.settling import memory_of
@@ -166,6 +166,7 @@ def _messages(
             'the image seems to be mirrored: most IDs are not among the expected ones, and most '
             'would be in a mirror'
         )
+    remarks.append(repeated_remark(found.repeated))
     remarks.append(edge_shift_remark(found.edge_shift))
     if found.count == 0:
         remarks.append(white_remark(image))

@@ -39,7 +39,9 @@ from ahf_ros.target import (
     Identification,
     SearchTrace,
     Target,
+    UndecodedTarget,
     count_codes,
+    repeated_targets,
     sorted_targets,
 )
 from ahf_ros.target_check import checked_targets
@@ -123,6 +125,8 @@ class Identifier:
     patience : int
         Patience of a search where the settings have 0; without fusion, which lives on many
         filters. 0 for no limit.
+    contested : bool
+        Whether the results have targets that another one contradicts, with the ID `UNDECODED`.
     mirrored : callable, optional
         From a target to the ID that it has in a mirror, None if that is unknown.
     name : str
@@ -156,6 +160,7 @@ class Identifier:
         estimate: Estimate | None = None,
         interrupt: Callable[[], None] | None = None,
         patience: int = 0,
+        contested: bool = False,
         mirrored: MirroredId | None = None,
         name: str = 'detector',
         clock: Callable[[], float] = time.monotonic,
@@ -174,6 +179,7 @@ class Identifier:
         self._refine = refine
         self._estimate = estimate
         self._clock = clock
+        self._contested = contested
         self._mirrored = mirrored
         self._name = name
 
@@ -253,6 +259,11 @@ class Identifier:
         if fusing:
             agreeing = dict.fromkeys([choice.filter, *trials.plain, *choice.tried])
             targets = fused([trials.targets[values] for values in agreeing])
+        repeated = repeated_targets(targets)
+        if not self._contested:
+            targets = [
+                it for it in targets if not (isinstance(it, UndecodedTarget) and it.is_contested)
+            ]
         self.last_search = choice.search
         settled = (count_codes(targets), choice.expected) if estimating else None
         self.memory = replace(self.memory, filter=choice.remembered, settled=settled)
@@ -280,6 +291,7 @@ class Identifier:
             search=_trace_of(choice.search, trials, stack) if choice.search else None,
             edge_shift=median_edge_shift(ordered),
             other_ids=trials.left_out(choice.filter),
+            repeated=repeated,
         )
 
     def _trials(self, stack: ImageStack) -> Trials:

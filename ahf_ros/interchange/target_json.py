@@ -86,6 +86,7 @@ def to_json(
             asdict(target) | _remarks(target, readings.get(target.family), detector)
             for target in targets
         ],
+        'repeated': [asdict(target) for target in identification.repeated],
         'filter': used,
         'search': asdict(identification.search) if identification.search else None,
         'elapsed_s': elapsed,

@@ -20,7 +20,7 @@ from ahf_ros.filtering.settings import (
 from ahf_ros.filtering.trials import CONFIRMED
 from ahf_ros.session import create_identifier
 from ahf_ros.synthetic.scene import SceneSettings, render
-from ahf_ros.target import UNDECODED, Target, count_codes
+from ahf_ros.target import UNDECODED, Target, UndecodedTarget, count_codes
 
 COUNT = 144
 SHORT = AdaptiveSettings(genetic=GeneticSettings(max_evaluations=30))
@@ -71,6 +71,20 @@ def test_the_edge_shift_of_an_image_is_the_median_of_its_decoded_targets():
     targets = [replace(target(number), edge_shift=it) for number, it in shifts.items()]
     assert identify(BRIGHT, lambda _: targets, 0).edge_shift == -0.5
     assert identify(BRIGHT, lambda _: targets[:1], 0).edge_shift is None
+
+
+@pytest.mark.parametrize('asked', [False, True])
+def test_targets_that_share_an_id_are_named_and_not_identified(asked: bool) -> None:
+    contested = {'reason': 'contested', 'likely_family': 'a'}
+    twins = [
+        UndecodedTarget(UNDECODED, 0, x, 5.0, 1.0, 1.0, likely_id=7, **contested)
+        for x in (5.0, 9.0)
+    ]
+    other = UndecodedTarget(UNDECODED, 0, 20.0, 5.0, 1.0, 1.0, likely_id=8, **contested)
+    identifier = Identifier(lambda _: [*twins, other, target(3)], contested=asked)
+    found = identifier.identify(BRIGHT)
+    assert (found.count, found.repeated) == (1, tuple(twins))
+    assert [it.id for it in found] == [UNDECODED] * (3 * asked) + [3]
 
 
 def test_the_image_as_received_comes_first_and_may_be_enough():

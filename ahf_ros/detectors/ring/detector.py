@@ -202,7 +202,10 @@ def read_pyramid(
 
 
 def report(hypotheses: Hypotheses, settings: DetectorSettings) -> list[Target]:
-    """Return the targets to report: one for each dot, and one for each ID at the most."""
+    """Return the targets to report: one for each dot, and one for each ID at the most.
+
+    Targets that claim one ID in several places are among them, undecoded.
+    """
     major, _, _ = frame.ellipse_axes(hypotheses.frames)
     whole = settings.report_undecoded & (hypotheses.share >= WHOLE)
     minimum, maximum = settings.radii
@@ -218,7 +221,7 @@ def report(hypotheses: Hypotheses, settings: DetectorSettings) -> list[Target]:
     )[1]
     kept, certain = resolve(hypotheses, keys)
     if not settings.report_undecoded:
-        kept = certain
+        kept &= hypotheses.certain
     likely, ids = ids[kept], np.where(certain, ids, UNDECODED)
     some = hypotheses.select(kept)
     columns = (some.frames, some.covariance, ids[kept], codes[kept], some.confidence)
