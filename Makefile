@@ -32,8 +32,8 @@ OLDEST := .venv-oldest
 unexport AMENT_PREFIX_PATH CMAKE_PREFIX_PATH LD_LIBRARY_PATH PYTHONPATH
 unexport _ROS_WHEELS_BOOTSTRAP_COMPLETE
 
-.PHONY: demo nodes test lint site test-native test-live test-computing test-oldest test-portable \
-	test-kilted test-colcon browser clean
+.PHONY: demo nodes test lint site test-native test-live test-computing test-detectors test-oldest \
+	test-portable test-kilted test-colcon browser clean
 .DELETE_ON_ERROR:
 
 demo: $(INSTALLED)
@@ -41,8 +41,8 @@ demo: $(INSTALLED)
 
 nodes: $(NODES)
 
-# The longest first, so that two cores end at the same time.
-test: test-live test-oldest test-computing test-portable lint site
+# The longest first, and none so long that it ends alone: two cores end at the same time.
+test: test-live test-oldest test-detectors test-computing site lint test-portable
 
 lint: $(READY)
 	$(BIN)/ruff check .
@@ -53,16 +53,20 @@ lint: $(READY)
 site: $(READY)
 	$(BIN)/python scripts/build_site.py build/site
 
-test-native: test-computing test-live
+test-native: test-detectors test-computing test-live
 
-# What runs nodes and other processes, and the rest.
+# What runs nodes and other processes, what identifies targets in many images, and the rest.
 LIVE = test/bag test/batch test/cli test/nodes test/test_every_way.py
+DETECTORS = test/benchmarks test/detectors
 
 test-live: $(READY)
 	$(BIN)/python -m pytest $(LIVE)
 
 test-computing: $(READY) | $(if $(CI),browser)
-	$(BIN)/python -m pytest $(LIVE:%=--ignore %)
+	$(BIN)/python -m pytest $(patsubst %,--ignore %,$(LIVE) $(DETECTORS))
+
+test-detectors: $(READY)
+	$(BIN)/python -m pytest $(DETECTORS)
 
 # Reports are tested in Chromium. CI installs it where it can; elsewhere the test skips without it.
 browser:
@@ -83,9 +87,11 @@ test-portable: $(READY)
 	$(BIN)/python -m support.vector_units baseline $(BIN)/python -m pytest \
 		test/detectors/test_square.py test/detectors/test_sides.py
 
-# What talks to ROS 2, on Kilted; what lasts long does so on Jazzy only.
+# What talks to ROS 2, on Kilted, with no more installed than that needs; what lasts long does so on
+# Jazzy only.
 test-kilted:
-	$(MAKE) DISTRIBUTION=kilted .venv-kilted/ready
+	$(MAKE) DISTRIBUTION=kilted .venv-kilted/nodes
+	.venv-kilted/bin/python -m pip install $(QUIET) 'ahf_ros[bag]' hypothesis pytest
 	.venv-kilted/bin/python -m pytest -m 'not lasting' \
 		$$(grep -lrE 'rclpy|graph: ' test --include='test_*.py')
 

@@ -40,6 +40,7 @@ def test_other_arcs_end_anywhere() -> None:
     assert np.median(found) < -10  # measured: -29
 
 
+@pytest.mark.lasting
 @pytest.mark.parametrize('name', ['metashape12', 'aicon14'])
 def test_marks_of_no_family_are_not_reported(name: str) -> None:
     generator = np.random.default_rng(35)

@@ -64,6 +64,7 @@ def test_targets_are_read_out_of_focus() -> None:
     assert counted(shown, create_detector(family='cctag3')(image)) == (4, 0, 0)
 
 
+@pytest.mark.lasting
 @pytest.mark.parametrize('family', CCTAG_NAMES)
 def test_small_targets_are_found_in_stripes(family: str) -> None:
     shown = scene(family, light='stripe', ambient=0.3, dot_radius=12.0, targets=10)
@@ -80,6 +81,7 @@ def test_the_growth_of_ink_is_reported() -> None:
     assert [target.edge_shift for target in found] == pytest.approx([0.4] * 3, abs=0.1)
 
 
+@pytest.mark.lasting
 @pytest.mark.parametrize('family', ['metashape12', 'aicon14', 'dots'])
 @pytest.mark.parametrize('light', ['normal', 'lattice'])
 def test_targets_of_other_families_are_none(family: str, light: str) -> None:
@@ -89,6 +91,7 @@ def test_targets_of_other_families_are_none(family: str, light: str) -> None:
     assert create_detector(family='cctag3,cctag4')(shown.image) == []
 
 
+@pytest.mark.lasting
 @pytest.mark.parametrize('seed', [312, 320])
 def test_rings_in_rings_are_none(seed: int) -> None:
     assert create_detector(family='cctag3,cctag4')(lookalikes(seed)) == []
@@ -126,6 +129,7 @@ def test_refinement_finds_the_place_again() -> None:
     assert np.abs(errors(shown, refined)).max() < 0.05
 
 
+@pytest.mark.lasting
 def test_letters_that_are_read_as_one_id_in_many_places_are_texture() -> None:
     letters = textured_image(501)[340:400]
     assert create_detector(family='cctag4')(letters) == []

@@ -42,6 +42,7 @@ def test_a_bright_family_is_rendered_and_found_bright(tmp_path: Path) -> None:
     assert score(dark, forced).right == 12
 
 
+@pytest.mark.lasting
 @pytest.mark.parametrize(
     'circles', ['[[3.7, 4.2]]', '[[1.4, 1.8]]', '[[4.2, 5], [5.5, 5.7]]'], ids=str
 )
@@ -86,6 +87,7 @@ def test_a_single_mark_of_many_sectors_is_read(tmp_path: Path, radius: float) ->
     assert sorted(it.id for it in found) == [1, 2, 3]
 
 
+@pytest.mark.lasting
 @pytest.mark.parametrize(('light', 'least'), [('normal', 10), ('lattice', 6)])
 def test_sectors_that_blur_mixes_are_read(tmp_path: Path, light: str, least: int) -> None:
     generator = np.random.default_rng(4)
@@ -99,6 +101,7 @@ def test_sectors_that_blur_mixes_are_read(tmp_path: Path, light: str, least: int
     assert found.wrong == found.false_positives == 0
 
 
+@pytest.mark.lasting
 @pytest.mark.parametrize(
     ('bits', 'band', 'radius'),
     [(22, (1.8, 2.7), 6.2), (24, (1.41, 2.0), 7.8)],

@@ -127,6 +127,7 @@ def test_even_light_is_enough_for_the_published_methods(
     assert all(0 < target.confidence <= 1 for target in found)
 
 
+@pytest.mark.lasting
 @pytest.mark.parametrize(
     ('family', 'changes', 'options', 'least'),
     [

@@ -27,6 +27,7 @@ def scene(**changes: object) -> Rendering:
     return rendering(**SIZE | changes)
 
 
+@pytest.mark.lasting
 @pytest.mark.parametrize(
     ('radius', 'changes'),
     [

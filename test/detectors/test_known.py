@@ -87,6 +87,7 @@ def test_no_two_ids_chosen_far_apart_look_alike_where_sectors_are_covered():
             looks[look] = number
 
 
+@pytest.mark.lasting
 def test_paper_on_paper_turns_one_id_into_another_unless_they_are_known(covered):
     assert any(WRONG in blind for _, _, blind in covered)  # no trace is left to see
     informed = create_detector('ring').expecting(frozenset(IDS))

@@ -29,7 +29,7 @@ One that the frame cuts is not confirmed."""
 SEEN_ELSEWHERE = 12  # targets near by, in another photograph
 NEAR = 3.0  # px
 
-pytestmark = needs_photographs
+pytestmark = [needs_photographs, pytest.mark.lasting]
 
 
 def predicted(truth: Truth, name: str, number: int) -> np.ndarray:

@@ -111,6 +111,7 @@ def test_nothing_is_refined_to_nothing():
     assert refine_centres(rendered(SCENE).image, [], [CODE]) == []
 
 
+@pytest.mark.lasting
 @pytest.mark.parametrize('name', ['ring', 'traditional'])
 def test_a_filter_leaves_no_trace_in_the_places(name):
     """The detector is blind to the image as received; AHF refines there all the same."""

@@ -37,6 +37,7 @@ def test_all_targets_under_stripes_and_lattices(name, polarity, light):
     assert worst < 0.4  # where an edge of light lies along that of the dot
 
 
+@pytest.mark.lasting
 @pytest.mark.parametrize(('polarity', 'light'), LIGHTS)
 @pytest.mark.parametrize('name', FAMILY_NAMES)
 def test_deep_shadow_costs_a_target_at_most_and_no_wrong_id(name, polarity, light):
@@ -69,6 +70,7 @@ def test_sizes_and_views(scene, limit):
     assert errors_of(figures)[-1] < limit
 
 
+@pytest.mark.lasting
 @pytest.mark.parametrize('light', ['stripe', 'fine_stripe', 'lattice'])
 def test_oblique_views_under_stripes_and_lattices(light):
     view = SceneSettings(width=1000, height=600, targets=12, tilt=64.0, focal_length=3.0, seed=1)
@@ -77,6 +79,7 @@ def test_oblique_views_under_stripes_and_lattices(light):
     assert figures.right >= 11
 
 
+@pytest.mark.lasting
 @pytest.mark.parametrize(('light', 'enough'), [('normal', 20), ('stripe', 16)])
 def test_small_oblique_targets(light, enough):
     view = SceneSettings(width=1100, height=800, targets=20, dot_radius=7.0, tilt=60.0, seed=11)
@@ -160,6 +163,7 @@ def test_an_id_is_reported_once_or_not_at_all():
     assert {target.likely_id for target in contested} <= {it.id for it in rendering.targets}
 
 
+@pytest.mark.lasting
 @pytest.mark.parametrize('kept', [0.5, 1.5, 2.5, 3.2])
 @pytest.mark.parametrize('name', FAMILY_NAMES)
 def test_a_target_that_the_frame_cuts_is_not_guessed(name, kept):
@@ -175,6 +179,7 @@ def test_a_target_that_the_frame_cuts_is_not_guessed(name, kept):
     assert figures.right == figures.expected >= 3
 
 
+@pytest.mark.lasting
 def test_a_covered_sector_is_not_guessed():
     rendering = rendered(SMALL)
     for turn in np.arange(0, 360, 45):
@@ -306,6 +311,7 @@ def whole_sheet() -> Sheet:
     return target_sheet('metashape12', random_numbers('metashape12', 18, 31)[0], 31)
 
 
+@pytest.mark.lasting
 @pytest.mark.parametrize('sight', COVERED)
 def test_what_is_covered_costs_targets_and_gives_no_wrong_one(sight):
     exposure, minimum = COVERED[sight]
@@ -314,6 +320,7 @@ def test_what_is_covered_costs_targets_and_gives_no_wrong_one(sight):
     assert len(targets) == figures.right >= minimum
 
 
+@pytest.mark.lasting
 @pytest.mark.parametrize('read_as', [name for name in FAMILY_NAMES if name != 'metashape12'])
 def test_targets_of_another_family_are_not_reported(read_as):
     assert not identified(whole_sheet().photograph(Exposure()), family=read_as)
@@ -330,6 +337,7 @@ def seen(**changes):
     return score(scene, targets), {it.id: it.edge_shift for it in targets}
 
 
+@pytest.mark.lasting
 @pytest.mark.parametrize('polarity', ['dark', 'bright'])
 @pytest.mark.parametrize('edge_shift', [-1.0, -0.6, 0.6, 1.0])
 def test_shifted_edges_cost_no_target_and_are_reported(edge_shift, polarity):

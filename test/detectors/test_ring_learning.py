@@ -80,6 +80,7 @@ def test_arcs_that_end_anywhere_are_no_family() -> None:
         assert learn_families(replace(bands, ink=ink.astype(float))) == []
 
 
+@pytest.mark.lasting
 def test_rules_that_few_words_cannot_tell_have_a_probability() -> None:
     (few,) = learnt(shown('metashape20', dot_radius=12, seed=1).image)
     assert all(rules['parity'] == 'even' for rules, _ in few.likely)
