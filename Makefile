@@ -93,7 +93,8 @@ test-kilted:
 	$(MAKE) DISTRIBUTION=kilted .venv-kilted/nodes
 	.venv-kilted/bin/python -m pip install $(QUIET) 'ahf_ros[bag]' hypothesis pytest
 	.venv-kilted/bin/python -m pytest -m 'not lasting' \
-		$$(grep -lrE 'rclpy|graph: ' test --include='test_*.py')
+		$$(grep -lrE 'rclpy|graph: ' test/bag test/interchange test/nodes \
+			--include='test_*.py')
 
 # With ROS 2 from PyPI; where one is sourced, run the script itself.
 test-colcon:
