@@ -5,7 +5,6 @@ from __future__ import annotations
 import ast
 import doctest
 import inspect
-import os
 import re
 import sys
 import warnings
@@ -159,33 +158,6 @@ def test_images_are_turned_upright_by_the_word_that_the_command_line_has(tmp_pat
         assert (read_image(path, upright=True) == IMAGE).all()
     with pytest.warns(DeprecationWarning, match='read_image calls turned upright now'):
         assert (read_image(path, turned=True) == IMAGE).all()
-
-
-TYPED = """
-from ahf_ros import create_detector, create_identifier, identify
-import numpy as np
-
-image = np.zeros((9, 9), np.uint8)
-identify(image, family='metashape12', min_radius=4, expected_targets=3, search='published')
-create_identifier(polarity='dark', threads=1)
-create_detector('ring', polarity='dark')
-identify(image, expected=3)
-identify(image, min_radius='4')
-create_identifier(polarity='black')
-create_detector(threads=1)
-identify(image, 'ring')
-"""
-
-
-def test_type_checkers_know_the_options(tmp_path: Path) -> None:
-    pytest.importorskip('mypy', reason='mypy is not installed')
-    file = tmp_path / 'typed.py'
-    file.write_text(TYPED)
-    options = '--no-error-summary', '--follow-imports=silent', '--ignore-missing-imports'
-    config = '--config-file', ROOT / 'pyproject.toml', '--cache-dir', os.devnull
-    done = python('-m', 'mypy', *options, *config, file)
-    wrong = {int(line) for line in re.findall(r'typed\.py:(\d+): error', done.stdout)}
-    assert wrong == {9, 10, 11, 12, 13}, done.stdout + done.stderr
 
 
 SMALL = SceneSettings(width=320, height=240, targets=3, dot_radius=8)
