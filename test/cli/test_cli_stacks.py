@@ -12,6 +12,7 @@ from ahf_ros.cli.identify import stacked
 from ahf_ros.interchange.image_files import read_image, write_image
 from support.command_line import status
 
+FAMILY = '--family=metashape12'
 NAMES = [f'stripe_0.02_{seed}_{phase}.png' for seed in (1, 2) for phase in range(4)]
 
 
@@ -37,7 +38,7 @@ def test_phases_are_one_scene_in_light_that_moves(folder):
 
 def test_every_stack_is_one_result_that_names_its_images(folder, tmp_path, capsys):
     paths = [str(folder / name) for name in NAMES]
-    assert status('identify', *paths, '--stack', 4, '--expected-targets', 4, '--json') == 0
+    assert status('identify', *paths, FAMILY, '--stack', 4, '--expected-targets', 4, '--json') == 0
     (tmp_path / 'results.jsonl').write_text(capsys.readouterr().out)
     results = [json.loads(line) for line in (tmp_path / 'results.jsonl').open()]
     assert [result['images'] for result in results] == [paths[:4], paths[4:]]
@@ -52,7 +53,7 @@ def test_every_stack_is_one_result_that_names_its_images(folder, tmp_path, capsy
 
 def test_names_and_folders_say_what_belongs_together(folder, capsys):
     paths = [str(folder / name) for name in reversed(NAMES)]
-    status('identify', *paths, '--stack-by', r'(.*)_\d', '--expected-targets', 4, '--json')
+    status('identify', *paths, FAMILY, '--stack-by', r'(.*)_\d', '--json')
     results = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
     assert [result['images'] for result in results] == [paths[:4], paths[4:]]
     assert [len(result['targets']) for result in results] == [4, 4]
@@ -61,11 +62,11 @@ def test_names_and_folders_say_what_belongs_together(folder, capsys):
 def test_a_stack_of_several_sizes_is_split_and_what_is_unreadable_is_left_out(
     folder, tmp_path, capsys
 ):
-    paths = [str(folder / name) for name in NAMES[:3]]
+    paths, seen = [str(folder / name) for name in NAMES[:3]], tmp_path / 'seen'
     write_image(tmp_path / 'other.png', read_image(paths[0])[:-8])
     (tmp_path / 'broken.png').write_bytes(b'nothing')
     paths += [str(tmp_path / 'other.png'), str(tmp_path / 'broken.png')]
-    assert status('identify', *paths, '--stack=5', '--json', '--overlay', tmp_path / 'seen') == 1
+    assert status('identify', *paths, FAMILY, '--stack=5', '--json', '--overlay', seen) == 1
     output, errors = capsys.readouterr()
     first, second = (json.loads(line) for line in output.splitlines())
     assert (first['images'], second['images']) == (paths[:3], paths[3:4])
@@ -73,8 +74,10 @@ def test_a_stack_of_several_sizes_is_split_and_what_is_unreadable_is_left_out(
     assert second['split'].startswith(reason)
     for said in (reason, 'broken.png', '4 of 5 images of a stack'):
         assert said in errors
-    seen = sorted(path.name for path in (tmp_path / 'seen').iterdir())
-    assert seen == ['other_overlay.png', 'stripe_0.02_1_0_overlay.png']
+    assert sorted(path.name for path in seen.iterdir()) == [
+        'other_overlay.png',
+        'stripe_0.02_1_0_overlay.png',
+    ]
 
 
 def test_groups_are_in_the_order_of_their_first_images():
@@ -107,7 +110,7 @@ def test_a_missing_file_is_no_part_of_a_stack(folder, tmp_path, capsys) -> None:
         f'{path.name} cannot be read: No such file or directory' for path in missing
     ]
     image = str(folder / NAMES[0])
-    assert status('identify', *missing, image, '--stack=2', '--json') == 1
+    assert status('identify', *missing, image, FAMILY, '--stack=2', '--json') == 1
     output, errors = capsys.readouterr()
     assert [json.loads(line)['images'] for line in output.splitlines()] == [[image]]
     assert errors.count('No such file') == 2

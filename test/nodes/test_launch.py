@@ -261,7 +261,7 @@ def test_the_nodes_of_the_demo_work_together(graph: Any) -> None:
     assert all(Path(file).is_file() for file in result.environment.values())
     small = {
         'illumination': ('width:=640', 'height:=480', 'targets:=6', 'dot_radius:=10', 'rate:=2'),
-        'detector': ('expected_targets:=6', 'image_timeout:=0.0'),
+        'detector': ('family:=metashape12', 'expected_targets:=6', 'image_timeout:=0.0'),
         'scoreboard': ('images:=2',),
     }
     processes = {}
