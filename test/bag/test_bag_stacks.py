@@ -12,12 +12,15 @@ pytest.importorskip('rosbags', reason='rosbags is not installed')
 from ahf_ros.bag.definitions import IMAGE, typestore
 from ahf_ros.bag.run import BagTask, answer_bag
 from ahf_ros.cli import main
+from ahf_ros.detectors import DetectorSettings
 from ahf_ros.session_settings import IdentificationSettings, StackSettings
 from ahf_ros.synthetic.scene import SceneSettings, render
 from support import bags
 
 SCENE = SceneSettings(**bags.SCENE, ambient=0.02, phases=4)
-SETTINGS = IdentificationSettings(expected_targets=4)
+SETTINGS = IdentificationSettings(
+    expected_targets=4, detection=DetectorSettings(family=SCENE.family)
+)
 
 
 @pytest.fixture(scope='module')
@@ -44,7 +47,8 @@ def ids(path: Path) -> list[list[int]]:
 
 def test_a_stack_has_one_answer_with_the_stamp_of_its_last_image(recording, tmp_path, capsys):
     out = tmp_path / 'out'
-    assert main(['bag', str(recording), str(out), '--stack', '4', '--expected', '4']) == 0
+    given = '--family', SCENE.family, '--stack', '4', '--expected', '4'
+    assert main(['bag', str(recording), str(out), *given]) == 0
     assert stamps(out) == [4, 7]
     assert ids(out)[0] == [target.id for target in render(SCENE).targets]
     said = capsys.readouterr().err

@@ -10,6 +10,7 @@ from ahf_ros.synthetic.scene import SceneSettings, render
 from support.scenes import scored
 
 
+@pytest.mark.lasting
 @pytest.mark.parametrize(
     ('family', 'polarity', 'dot_radius', 'targets'),
     [

@@ -32,6 +32,8 @@ from support.detector import DetectorProcess, overrides, values
 CONFIG = Path(__file__).parents[2] / 'config' / 'detector.yaml'
 SCENE = {'width': 1000, 'height': 700, 'targets': 6}
 MAXIMUM_ERROR = 0.1  # px
+FAMILY = overrides(family='metashape12')
+"""Where it does not matter what is found: `auto` takes ten times as long."""
 PATIENT = {'image_timeout': 0}
 """Nothing is said of images that a busy machine has not sent yet."""
 ENDLESS = {
@@ -59,7 +61,7 @@ def header() -> Header:
 
 @pytest.fixture(scope='module')
 def detector(graph: Any) -> DetectorProcess:
-    return DetectorProcess(graph, '/own', '--params-file', str(CONFIG))
+    return DetectorProcess(graph, '/own', '--params-file', str(CONFIG), *FAMILY)
 
 
 @pytest.fixture(scope='module')
@@ -327,7 +329,7 @@ def test_a_signal_ends_the_node_in_the_middle_of_a_search(
 ) -> None:
     space = f'/ending{number}'
     given = overrides(**PATIENT, **ENDLESS)
-    detector = DetectorProcess(graph, space, *given)
+    detector = DetectorProcess(graph, space, *given, *FAMILY)
     detector.image.publish(message)
     graph.until(lambda: detector.told('received') == '1')
     assert detector.process.end(number) == (0, '')
@@ -366,7 +368,7 @@ def test_a_service_is_a_detector_and_its_end_is_named(
     status, errors = nameless.wait()
     assert status == 1
     assert "service is '', accepted is the name of a ROS service" in errors
-    other = graph.start('detector', '-r', '__ns:=/other')
+    other = graph.start('detector', '-r', '__ns:=/other', *FAMILY)
     graph.until(lambda: ('detector', '/other') in graph.node.get_node_names_and_namespaces())
     # So long that a busy machine answers in it, so short that a lost answer is asked for again.
     chosen = overrides(
@@ -381,7 +383,7 @@ def test_a_service_is_a_detector_and_its_end_is_named(
     response = detector.identify(image_message(rendering.image, header()))
     assert not response.success
     assert response.message == "service '/other/detector/identify' is not there"
-    graph.start('detector', '-r', '__ns:=/other')
+    graph.start('detector', '-r', '__ns:=/other', *FAMILY)
     again = graph.until(
         lambda: (it := detector.identify(image_message(rendering.image, header()))).success and it
     )

@@ -20,7 +20,7 @@ from ahf_ros.nodes.illumination import camera_info
 from ahf_ros.nodes.messages import image_message
 from ahf_ros.nodes.undistortion import Calibrations
 from ahf_ros.synthetic.scene import SceneSettings, render
-from support.detector import DetectorProcess
+from support.detector import DetectorProcess, overrides
 
 SCENE = SceneSettings(width=1000, height=700, targets=6, distortion=-0.2)
 
@@ -47,7 +47,7 @@ def test_an_image_finds_the_calibration_of_its_time() -> None:
 
 
 def test_targets_are_undistorted_where_camera_info_belongs_to_the_image(graph: Any) -> None:
-    remapped = '-r', 'image:=/camera/image_raw', '-p', 'undistort:=true'
+    remapped = '-r', 'image:=/camera/image_raw', *overrides(undistort='true', family=SCENE.family)
     detector = DetectorProcess(graph, '/lens', *remapped, images='/camera/image_raw')
     moved = graph.listen(CodedTargetArray, '/lens/detector/undistorted_targets')
     diagnostics = graph.listen(DiagnosticArray, '/lens/diagnostics')

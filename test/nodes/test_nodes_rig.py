@@ -91,7 +91,7 @@ class Rig(DetectorProcess):
     """A detector that is given clouds, and what it says."""
 
     def __init__(self, graph: Any) -> None:
-        super().__init__(graph, '/own', *overrides(cloud='true'))
+        super().__init__(graph, '/own', *overrides(cloud='true', family=SCENE.family))
         self.points = graph.listen(PointCloud2, '/own/detector/target_points')
         self.cloud = graph.publisher(PointCloud2, '/own/points')
 
@@ -268,7 +268,7 @@ def test_cameras_in_namespaces_know_nothing_of_each_other(graph: Any) -> None:
     expected = {'left': SCENE.targets, 'right': 0}
     answers, images = {}, {}
     for side in scenes:
-        given = overrides(expected_targets=expected[side])
+        given = overrides(expected_targets=expected[side], family=SCENE.family)
         graph.start('detector', '-r', f'__ns:=/{side}', *given)
         answers[side] = graph.listen(CodedTargetArray, f'/{side}/coded_targets')
         images[side] = graph.publisher(Image, f'/{side}/image')

@@ -58,7 +58,7 @@ class Bench(DetectorProcess):
     def __init__(self, graph: Any, name: str, *places: str, **given: Any) -> None:
         remapped = [word for place in places for word in ('-r', place)]
         # Nothing is said of images that a busy machine has not sent yet.
-        chosen = overrides(**{'image_timeout': 0, **given})
+        chosen = overrides(**{'image_timeout': 0, 'family': 'metashape12', **given})
         super().__init__(graph, f'/{name}', *remapped, *chosen, subscribed=False)
         # The node then knows who listens to its answers, too.
         assert self.diagnostics
@@ -103,7 +103,7 @@ def test_a_detector_that_is_killed_in_the_middle_of_a_search_and_comes_again(gra
     graph.until(lambda: int(bench.told('received') or 0) >= 3)
     assert bench.told('answered') == '0'
     bench.kill()
-    bench.start(*overrides(image_timeout=0))
+    bench.start(*overrides(image_timeout=0, family='metashape12'))
     graph.until(lambda: len(bench.targets) >= 3)
     assert all(len(answer.targets) == SCENE['targets'] for answer in bench.targets)
     assert camera.end() == (0, '')

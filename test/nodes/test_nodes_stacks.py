@@ -23,6 +23,7 @@ SCENE = SceneSettings(
 PHASES = [render(SCENE, phase).image for phase in range(4)]
 TRUTH = [target.id for target in render(SCENE).targets]
 OPTIONS = {
+    'family': SCENE.family,
     'queue': 'lossless',
     'stack': 4,
     'expected_targets': 4,

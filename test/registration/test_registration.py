@@ -72,6 +72,7 @@ def test_covariances_of_a_chain_agree_with_its_errors(adjust: bool) -> None:
     assert np.mean(squares) == pytest.approx(6, abs=4 * np.sqrt(12 / 40))
 
 
+@pytest.mark.lasting
 @pytest.mark.parametrize('adjust', [False, True])
 def test_covariances_of_targets_agree_with_their_errors(adjust: bool) -> None:
     squares = []
