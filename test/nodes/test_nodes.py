@@ -187,7 +187,7 @@ def test_every_parameter_says_what_it_is(graph: Any, detector: DetectorProcess) 
         ('family', 'qr', ("family is 'qr', accepted is one of metashape12",)),
         ('detector', 'ring', ('read-only',)),
         ('ahf', 1, ('ahf is 1, accepted is true or false',)),
-        ('max_radius', 1, ('min_radius is 2.0, accepted is', 'at most max_radius, 1.0')),
+        ('max_radius', 1, ('min_radius is 4.0, accepted is', 'at most max_radius, 1.0')),
     ],
 )
 def test_a_refused_parameter_is_named(

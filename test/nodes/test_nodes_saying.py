@@ -176,7 +176,7 @@ def assert_losses_are_counted(quiet: DetectorProcess, answers: list[CodedTargetA
 
 
 def test_the_families_of_a_stream_are_said_when_they_settle(graph: Any) -> None:
-    detector = DetectorProcess(graph, '/settling', *overrides(family='auto'))
+    detector = DetectorProcess(graph, '/settling', *overrides(family='auto', image_timeout=0))
     shown = rendered(SceneSettings(width=320, height=240, targets=3, dot_radius=8, seed=3))
     found = [detector.answer(image_message(shown.image, header())) for _ in range(2)]
     assert [[it.id for it in answer.targets] for answer in found] == [

@@ -118,7 +118,7 @@ def test_scans_of_a_box_live_and_recorded_are_in_its_frame(graph: Any, tmp_path:
     folder, table = tmp_path / 'scans', tmp_path / 'box.csv'
     table.write_text(SCANNER['table'](), encoding='utf-8')
     given = {'coordinates': str(table), 'folder': str(folder), 'frame': 'box'}
-    rig = Rig(graph, expected_targets='12', **given)
+    rig = Rig(graph, expected_targets='12', family='metashape12', **given)
     publishers = {name: graph.publisher(kind, name) for name, kind in SCANNER['TOPICS'].items()}
 
     def shoot(number: int) -> int:
