@@ -98,7 +98,7 @@ def test_exports_of_the_panel_hold_what_was_measured(panel, name, tmp_path):
 
 def test_targets_on_the_panel_are_counted_among_dots_without_code():
     truth = read_truth(PANEL / 'truth.csv')
-    for name in sorted(truth)[:4]:
+    for name in sorted(truth)[:2]:
         count = estimate_count(read_image(PANEL / name), DetectorSettings(family='aicon14'))
         assert abs(count - len(truth[name])) <= 2  # measured in all ten: 0 to 2
 
