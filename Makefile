@@ -32,8 +32,8 @@ OLDEST := .venv-oldest
 unexport AMENT_PREFIX_PATH CMAKE_PREFIX_PATH LD_LIBRARY_PATH PYTHONPATH
 unexport _ROS_WHEELS_BOOTSTRAP_COMPLETE
 
-.PHONY: demo nodes test lint site test-native test-live test-computing test-detectors test-oldest \
-	test-portable test-kilted test-colcon browser clean
+.PHONY: demo nodes test lint site test-native test-live test-commands test-computing test-detectors \
+	test-oldest test-portable test-kilted test-colcon browser clean
 .DELETE_ON_ERROR:
 
 demo: $(INSTALLED)
@@ -42,7 +42,7 @@ demo: $(INSTALLED)
 nodes: $(NODES)
 
 # The longest first, and none so long that it ends alone: two cores end at the same time.
-test: test-live test-oldest test-detectors test-computing site lint test-portable
+test: test-live test-oldest test-detectors test-commands test-computing site lint test-portable
 
 lint: $(READY)
 	$(BIN)/ruff check .
@@ -53,20 +53,24 @@ lint: $(READY)
 site: $(READY)
 	$(BIN)/python scripts/build_site.py build/site
 
-test-native: test-detectors test-computing test-live
+test-native: test-live test-detectors test-commands test-computing
 
-# What runs nodes and other processes, what identifies targets in many images, and the rest.
-LIVE = test/bag test/batch test/cli test/nodes test/test_every_way.py
+# What runs nodes, what runs commands, what identifies targets in many images, and the rest.
+LIVE = test/nodes test/test_every_way.py
+COMMANDS = test/bag test/batch test/cli
 DETECTORS = test/benchmarks test/detectors
 
 test-live: $(READY)
 	$(BIN)/python -m pytest $(LIVE)
 
-test-computing: $(READY) | $(if $(CI),browser)
-	$(BIN)/python -m pytest $(patsubst %,--ignore %,$(LIVE) $(DETECTORS))
+test-commands: $(READY)
+	$(BIN)/python -m pytest $(COMMANDS)
 
 test-detectors: $(READY)
 	$(BIN)/python -m pytest $(DETECTORS)
+
+test-computing: $(READY) | $(if $(CI),browser)
+	$(BIN)/python -m pytest $(patsubst %,--ignore %,$(LIVE) $(COMMANDS) $(DETECTORS))
 
 # Reports are tested in Chromium. CI installs it where it can; elsewhere the test skips without it.
 browser:
