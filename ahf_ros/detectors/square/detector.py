@@ -150,14 +150,16 @@ def _odds_together(readings: np.ndarray, one_place: Rivals, groups: Groups) -> n
     A group is there or not. One marker shows it, whichever it is, or different ones together,
     each by its lead over other groups in its place; so do those that a smaller dictionary does not
     have for a larger one. One texture may show several, so that they need more. Where another
-    group reads the same places, the surer one is there.
+    group reads the same places, the surer one is there, and of several markers of a group in one
+    place, as by borders of one and two cells, one is.
     """
     group, number, _, of_group, others = readings.T
-    odds = -np.logaddexp(-of_group, others)
-    lead = of_group.copy()
-    for index in range(len(lead)):
-        rivals = (group != group[index]) & one_place(index)
-        lead[index] -= of_group[rivals].max(initial=0.0)
+    lead, odds = np.empty((2, len(readings)))
+    for index, own in enumerate(of_group):
+        near, alike = one_place(index), group == group[index]
+        lead[index] = own - of_group[near & ~alike].max(initial=0.0)
+        marker = of_group[near & alike & (number != number[index])].max(initial=-inf)
+        odds[index] = -np.logaddexp(-own, max(others[index], marker - own))
     doubt = log(len(groups) ** _SEVERAL - 1) if len(groups) > 1 else -inf
     alone = log(len(groups) ** _ALONE - 1) if len(groups) > 1 else -inf
     against = np.full(len(odds), inf)
