@@ -20,7 +20,7 @@ from ahf_ros.detectors.contract import FamilyDetector, moved_targets
 from ahf_ros.detectors.square.prints import lay_outlines, lay_prints
 from ahf_ros.detectors.square.quadrilaterals import find_quadrilaterals
 from ahf_ros.detectors.square.reading import MINIMUM_ODDS, read
-from ahf_ros.detectors.square.sides import USED, centres, fit_sides
+from ahf_ros.detectors.square.sides import USED, Sides, centres, fit_sides
 from ahf_ros.features.frame import reduced
 from ahf_ros.features.pyramid import halved
 from ahf_ros.imaging.image import as_gray, check_image
@@ -77,15 +77,14 @@ class SquareDetector(FamilyDetector):
             if not level:  # what is small in a half is large enough here
                 small = np.linalg.norm(found[:, 2] - found[:, 0], axis=1) < _SMALL
                 found[small] = lay_outlines(half, found[small])
-            read_as = read(half, found, groups)
-            turned = [
-                np.roll(found[index], turn, axis=0)
-                for index, turn in zip(read_as.quadrilateral, read_as.turn, strict=True)
-            ]
-            corners.append((np.array(turned).reshape(-1, 4, 2) + 0.5) * 2**level - 0.5)
-            columns = (read_as.group, read_as.number, read_as.border, read_as.odds, read_as.others)
-            readings.append(np.stack(columns, axis=1))
+            found, read_as = _read(half, found, groups)
+            corners.append((found + 0.5) * 2**level - 0.5)
+            readings.append(read_as)
         places, rows = np.concatenate(corners), np.concatenate(readings)
+        again = _read(gray, _laid(gray, places, rows, groups), groups)
+        places, rows = np.concatenate([places, again[0]]), np.concatenate([rows, again[1]])
+        sure = rows[:, 3] > MINIMUM_ODDS
+        places, rows = places[sure], rows[sure]
         odds = _odds_together(rows, _one_place(places), groups)
         order = np.argsort(-odds, kind='stable')
         owning = owners(len(order), _one_place(places[order]))
@@ -142,6 +141,37 @@ class SquareDetector(FamilyDetector):
 def _grid(marker: SquareMarker) -> tuple[int, int]:
     """Return how many cells a side of a marker has, its border included, and this border."""
     return words(marker.family).shape[1] + 2 * marker.border, marker.border
+
+
+def _read(
+    gray: np.ndarray, corners: np.ndarray, groups: Groups
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the corners of readings, shape (k, 4, 2), and their columns, (k, 5)."""
+    found = read(gray, corners, groups)
+    turned = [
+        np.roll(corners[index], turn, axis=0)
+        for index, turn in zip(found.quadrilateral, found.turn, strict=True)
+    ]
+    columns = (found.group, found.number, found.border, found.odds, found.others)
+    return np.array(turned).reshape(-1, 4, 2), np.stack(columns, axis=1)
+
+
+def _laid(
+    gray: np.ndarray, corners: np.ndarray, readings: np.ndarray, groups: Groups
+) -> np.ndarray:
+    """Return the corners of prints that lie over the image where readings are doubtful."""
+    order = np.argsort(-readings[:, 3], kind='stable')
+    own = order[owners(len(order), _one_place(corners[order]))]
+    own = own[readings[own, 3] <= MINIMUM_ODDS]
+    found = [np.zeros((0, 4, 2))]
+    group, number, border = readings[own, :3].T.astype(int)
+    for index, width in sorted(set(zip(group.tolist(), border.tolist(), strict=True))):
+        alike = (group == index) & (border == width)
+        cells = words(groups[index][-1])[number[alike]]
+        prints = ~np.pad(cells, ((0, 0), (width, width), (width, width)))
+        fit = lay_prints(gray, Sides.unmeasured(corners[own[alike]]), prints)
+        found.append(fit.corners[fit.share > 0])
+    return np.concatenate(found)
 
 
 def _odds_together(readings: np.ndarray, one_place: Rivals, groups: Groups) -> np.ndarray:

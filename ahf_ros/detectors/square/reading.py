@@ -40,6 +40,8 @@ _PART_WEIGHT = 0.15  # of each part of a cell, which have one colour in other qu
 _BORDER_WEIGHT = 0.3  # of the cells of the border, which are alike in other quadrilaterals, too
 _CORNER_WEIGHT = 0.7
 _DOUBT = 6.0  # logarithmic odds against a marker that nothing but a quadrilateral speaks for
+_POSSIBLE = -15.0  # minimum of these odds where all is as usual but a corner or the blur
+_CLEAR = -5.0  # maximum of the odds of other markers where these odds are low
 _PLAIN = 0.35  # logarithmic odds against a marker, for each edge less than random cells have
 
 MINIMUM_ODDS = 2.2
@@ -88,7 +90,7 @@ def read(gray: np.ndarray, corners: np.ndarray, groups: Sequence[Sequence[str]])
             odds = evidence @ prints - prior
             best = odds.argmax(axis=1)
             total = odds[np.arange(len(best)), best] + against - _DOUBT - plain[best]
-            likely = np.flatnonzero(total > MINIMUM_ODDS)
+            likely = np.flatnonzero(total > _POSSIBLE)
             odds, best, total = odds[likely], best[likely], total[likely]
             # A turn of the same marker is no other: some are symmetric.
             number, turn = np.divmod(best, 4)
@@ -101,6 +103,7 @@ def read(gray: np.ndarray, corners: np.ndarray, groups: Sequence[Sequence[str]])
             columns = (which[likely], alike[0], number, turn, alike[1], total, others)
             found.append(np.stack(columns, axis=1))
     table = np.concatenate(found)
+    table = table[(table[:, 5] > MINIMUM_ODDS) | (table[:, 6] < _CLEAR)]
     which, group, number, turn, widths = table[:, :5].T.astype(int)
     return Readings(
         quadrilateral=which,

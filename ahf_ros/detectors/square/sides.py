@@ -92,6 +92,12 @@ class Sides:
     covariance: np.ndarray
     edge_shift: np.ndarray
 
+    @classmethod
+    def unmeasured(cls, corners: np.ndarray) -> Sides:
+        """Return markers of which only corners are known."""
+        count = len(corners)
+        return cls(corners, np.zeros(count), np.zeros((count, 2, 2)), np.full(count, np.nan))
+
 
 def centres(corners: np.ndarray) -> np.ndarray:
     """Return the intersections of the diagonals, the images of the centres, shape (k, 2)."""
