@@ -30,6 +30,7 @@ _DRAFT_DEVIATION = 0.3  # standard deviation of a centre from corners of contour
 _SMALL = 28.0  # diagonal of a marker whose cells are not much larger than pixels, px
 _SMALLEST_HALF = 24  # smaller side of a half that markers are looked for in, px
 _SAME_PLACE = 0.3  # distance of two readings of one marker, in sides
+_FITTED = 4.0  # logarithmic odds against a marker whose print was laid: half its eight unknowns
 _ALONE = 2.9  # ... one marker alone shows
 _SEVERAL = 4.0  # power of their number, one in which each of several groups is there
 _LARGER = 6.9  # logarithmic odds against a larger dictionary where most markers are of a smaller
@@ -81,8 +82,9 @@ class SquareDetector(FamilyDetector):
             corners.append((found + 0.5) * 2**level - 0.5)
             readings.append(read_as)
         places, rows = np.concatenate(corners), np.concatenate(readings)
-        again = _read(gray, _laid(gray, places, rows, groups), groups)
-        places, rows = np.concatenate([places, again[0]]), np.concatenate([rows, again[1]])
+        found, read_as = _read(gray, _laid(gray, places, rows, groups), groups)
+        read_as[:, 3] -= _FITTED
+        places, rows = np.concatenate([places, found]), np.concatenate([rows, read_as])
         sure = rows[:, 3] > MINIMUM_ODDS
         places, rows = places[sure], rows[sure]
         odds = _odds_together(rows, _one_place(places), groups)
