@@ -35,15 +35,8 @@ def drawn(corners: np.ndarray = CORNERS, light: np.ndarray | float = 200.0) -> n
     shown = cv2.resize(0.2 + 0.8 * shown, (side, side), interpolation=cv2.INTER_AREA)
     return (cv2.GaussianBlur(shown, (0, 0), 0.6) * light).astype(np.float32)
 
-
-def unmeasured(corners: np.ndarray) -> Sides:
-    """Return markers whose sides were not found."""
-    count = len(corners)
-    return Sides(corners, np.zeros(count), np.zeros((count, 2, 2)), np.full(count, np.nan))
-
-
 def test_corners_of_a_small_marker():
-    found = lay_prints(drawn(), unmeasured((CORNERS + ROUGH / 2)[None]), ink()[None])
+    found = lay_prints(drawn(), Sides.unmeasured((CORNERS + ROUGH / 2)[None]), ink()[None])
     assert np.abs(found.corners[0] - CORNERS).max() < 0.06
     assert np.abs(centres(found.corners) - centres(CORNERS[None])).max() < 0.03
     assert found.share[0] > 0.95
@@ -61,7 +54,7 @@ def test_what_is_no_marker_stays_as_it_is():
     noise = np.random.default_rng(1).normal(120, 30, (56, 56)).astype(np.float32)
     assert (lay_outlines(noise, CORNERS[None]) == CORNERS).all()
     for gray in (noise, np.full_like(noise, 90), 255 - drawn()):
-        found = lay_prints(gray, unmeasured(CORNERS[None]), ink()[None])
+        found = lay_prints(gray, Sides.unmeasured(CORNERS[None]), ink()[None])
         assert found.share[0] == 0
         assert (found.corners[0] == CORNERS).all()
 
@@ -78,7 +71,7 @@ def test_sides_are_kept_where_light_is_uneven():
 
 
 def test_markers_at_the_border_of_the_image_and_none_at_all():
-    found = lay_prints(drawn()[:, 14:], unmeasured((CORNERS - (14, 0))[None]), ink()[None])
+    found = lay_prints(drawn()[:, 14:], Sides.unmeasured((CORNERS - (14, 0))[None]), ink()[None])
     assert found.share[0] == 0
-    assert len(lay_prints(drawn(), unmeasured(np.zeros((0, 4, 2))), ink()[None][:0]).corners) == 0
+    assert len(lay_prints(drawn(), Sides.unmeasured(np.zeros((0, 4, 2))), ink()[None][:0]).corners) == 0
     assert len(lay_outlines(drawn(), np.zeros((0, 4, 2)))) == 0

@@ -20,7 +20,7 @@ References
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -53,6 +53,7 @@ _AGREES = 0.25  # residual of a sample that looks like the print, in all the con
 _ENOUGH, _HOPELESS = 0.9, 0.7  # share of such samples; where it is less, light is uneven
 _RIDGE = 1e-6  # of diagonals of normal matrices, so that they can be inverted
 _PLACE, _LEVELS = 8, 7  # unknowns of a homography; of the levels of paper and ink, and of growth
+_UNKNOWNS = _PLACE + 1 + _LEVELS
 _TOGETHER = 50_000  # samples at a time, which bounds the memory
 
 
@@ -87,8 +88,8 @@ def lay_prints(gray: np.ndarray, sides: Sides, prints: np.ndarray) -> Sides:
     return Sides(corners=corners, share=share, covariance=covariance, edge_shift=shift)
 
 
-def _blurred(prints: np.ndarray, places: np.ndarray, blur: np.ndarray) -> list[np.ndarray]:
-    """Return blurred prints and their derivatives by x, y and blur, each of shape (k, m^2).
+def _blurred(prints: np.ndarray, places: np.ndarray, blur: np.ndarray) -> np.ndarray:
+    """Return blurred prints and their derivatives by x, y and blur, shape (4, k, m^2).
 
     Places along either side have the shape (m,), blurs (k,), both in sides.
     """
@@ -100,13 +101,9 @@ def _blurred(prints: np.ndarray, places: np.ndarray, blur: np.ndarray) -> list[n
     ink = prints.astype(np.float64)
     along = shares @ ink, of_place @ ink, of_blur @ ink
     turned = [np.swapaxes(of, 1, 2) for of in (shares, of_place, of_blur)]
-    blurred = (
-        along[0] @ turned[0],
-        along[0] @ turned[1],
-        along[1] @ turned[0],
-        along[2] @ turned[0] + along[0] @ turned[2],
-    )
-    return [of.reshape(len(prints), -1) for of in blurred]
+    soft = along[2] @ turned[0] + along[0] @ turned[2]
+    blurred = (along[0] @ turned[0], along[0] @ turned[1], along[1] @ turned[0], soft)
+    return np.stack(blurred).reshape(4, len(prints), -1)
 
 
 def lay_outlines(gray: np.ndarray, corners: np.ndarray) -> np.ndarray:
@@ -153,36 +150,37 @@ def _laid(
     """
     grid = np.stack(np.meshgrid(places, places), axis=2).reshape(-1, 2)
     whole = prints.shape[1] > 1
-    known = whole | (np.abs(grid).max(axis=1) > 0.5 - 0.5 / cells)
+    known = slice(None) if whole else np.abs(grid).max(axis=1) > 0.5 - 0.5 / cells
     grid = grid[known]
+    plane = np.stack([np.ones(len(grid)), *grid.T])
+    order, first = _by_cells(grid, cells)
     frames, size = square_frames(corners), _lengths(corners)
     blur, levels = USUAL_BLUR / size, np.zeros((len(frames), _LEVELS))
     laid, share = corners.copy(), np.zeros(len(frames))
-    covariance, shift = np.zeros((len(frames), 2, 2)), np.zeros(len(frames))
+    normals = np.tile(np.eye(_UNKNOWNS), (len(frames), 1, 1))
+    sums = np.zeros((len(frames), _UNKNOWNS, len(first)))
     active = np.arange(len(frames))
     for number in range(_ROUNDS):
         points = project(frames[active], grid)
         values = sample(gray, points).astype(np.float64)
         inside = within(points, gray.shape)
-        ink = [of[:, known] for of in _blurred(prints[active], places, blur[active])]
-        linear = _of_levels(ink, grid, whole)
+        ink = _blurred(prints[active], places, blur[active])[..., known]
+        linear = _of_levels(ink, plane, whole)
         if not number:
-            levels = _solved(linear, inside, values)
-        residual = values - (linear @ levels[active, :, None])[..., 0]
-        step = levels[active, 3:6] @ np.stack([np.ones(len(grid)), *grid.T])
+            levels = _solved(*_normal_equations(linear, inside, values))
+        residual = values - (levels[active, None] @ linear)[:, 0]
+        step = levels[active, 3:6] @ plane
         usual = np.maximum(NORMAL * np.median(np.abs(residual), axis=1), _USUAL_RESIDUAL)
         weights = geman_mcclure(inside, residual / (_OUTLIER * usual[:, None]))
-        full = np.concatenate([_of_place(ink, grid, step), -linear], axis=2)
-        normal = _normal_matrix(full, weights)
-        scores = full * (weights * residual)[..., None]
-        change = -np.linalg.solve(normal, scores.sum(axis=1)[..., None])[..., 0]
+        full = np.concatenate([_of_place(ink, plane, step), -linear], axis=1)
+        normal, scores = _normal_equations(full, weights, residual)
+        change = -_solved(normal, scores)
         limit = _LARGEST_STEP / cells
         moved = np.tile(np.eye(3), (len(active), 1, 1))
         moved.reshape(-1, 9)[:, :_PLACE] += np.clip(change[:, :_PLACE], -limit, limit)
         frames[active] = frames[active] @ moved
-        side = size[active]
         softer = blur[active] + change[:, _PLACE]
-        blur[active] = np.clip(softer, _SHARPEST / side, _SOFTEST / cells)
+        blur[active] = np.clip(softer, _SHARPEST / size[active], _SOFTEST / cells)
         levels[active] += change[:, _PLACE + 1 :]
         there = project(frames[active], SQUARE)
         last = np.linalg.norm(there - laid[active], axis=2).max(axis=1)
@@ -190,65 +188,66 @@ def _laid(
         alike = (np.abs(residual) < _AGREES * np.ptp(values, axis=1)[:, None]).mean(axis=1)
         settled = (last < _SETTLED) & inside.all(axis=1) & (step.max(axis=1) < 0)
         which = active[settled]
-        share[which] = alike[settled]
-        covariance[which] = _covariance(
-            frames[which], normal[settled], scores[settled], grid, cells
-        )
-        shift[which] = levels[which, 6] / levels[which, 3] * size[which]
+        share[which], normals[which] = alike[settled], normal[settled]
+        sums[which] = np.add.reduceat(scores[settled][..., order], first, axis=2)
         hopeful = (alike > _HOPELESS) | (number == 0)
         active = active[~settled & hopeful]
         if not active.size:
             break
     near = np.linalg.norm(laid - corners, axis=2).max(axis=1) < np.maximum(size / cells, _NEAR)
-    return Sides(laid, np.where(near, share, 0.0), covariance, shift)
+    shift = levels[:, 6] / levels[:, 3] * size
+    return Sides(laid, np.where(near, share, 0.0), _covariance(frames, normals, sums), shift)
 
 
-def _of_levels(ink: Sequence[np.ndarray], grid: np.ndarray, whole: bool) -> np.ndarray:
-    """Return the derivatives of gray values by the levels and the growth of ink, (k, n, 7)."""
+def _of_levels(ink: np.ndarray, plane: np.ndarray, whole: bool) -> np.ndarray:
+    """Return the derivatives of gray values by the levels and the growth of ink, (k, 7, n)."""
     shares, x, y, _ = ink
-    linear = np.empty((*shares.shape, _LEVELS))
-    linear[..., 0], linear[..., 1:3] = 1, grid
-    linear[..., 3], linear[..., 4:6] = shares, shares[..., None] * grid
-    linear[..., 6] = whole * np.hypot(x, y)
+    linear = np.empty((len(shares), _LEVELS, plane.shape[1]))
+    linear[:, :3], linear[:, 3:6] = plane, shares[:, None] * plane
+    linear[:, 6] = np.hypot(x, y) if whole else 0.0
     return linear
 
 
-def _of_place(ink: Sequence[np.ndarray], grid: np.ndarray, step: np.ndarray) -> np.ndarray:
-    """Return the derivatives of residuals by a homography and the blur, (k, n, 9)."""
-    _, x, y, soft = (of * step for of in ink)
-    across, down = grid.T
+def _of_place(ink: np.ndarray, plane: np.ndarray, step: np.ndarray) -> np.ndarray:
+    """Return the derivatives of residuals by a homography and the blur, (k, 9, n)."""
+    x, y, soft = ink[1:] * step
+    _, across, down = plane
     moved = (x * across, x * down, x, y * across, y * down, y)
     bent = moved[0] + moved[4]
-    return np.stack([*moved, -bent * across, -bent * down, -soft], axis=2)
+    return np.stack([*moved, -bent * across, -bent * down, -soft], axis=1)
 
 
-def _normal_matrix(columns: np.ndarray, weights: np.ndarray) -> np.ndarray:
-    normal: np.ndarray = np.swapaxes(columns * weights[..., None], 1, 2) @ columns
+def _normal_equations(
+    rows: np.ndarray, weights: np.ndarray, values: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the matrices that rows, shape (k, m, n), make, and what each sample adds to sums."""
+    weighted = rows * weights[:, None]
+    normal: np.ndarray = weighted @ np.swapaxes(rows, 1, 2)
     diagonal = np.einsum('kii->ki', normal)
     diagonal += _RIDGE * diagonal + _RIDGE
-    return normal
+    weighted *= values[:, None]
+    return normal, weighted
 
 
-def _solved(columns: np.ndarray, weights: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Return the factors of columns, shape (k, m, n), that give the values, (k, n)."""
-    sums = (columns * (weights * values)[..., None]).sum(axis=1)
-    solved: np.ndarray = np.linalg.solve(_normal_matrix(columns, weights), sums[..., None])
+def _solved(normal: np.ndarray, scores: np.ndarray) -> np.ndarray:
+    solved: np.ndarray = np.linalg.solve(normal, scores.sum(axis=2)[..., None])
     return solved[..., 0]
 
 
-def _covariance(
-    frames: np.ndarray, normal: np.ndarray, scores: np.ndarray, grid: np.ndarray, cells: int
-) -> np.ndarray:
-    """Return the covariances of centres, px^2, from what the samples of each cell sum up to."""
+def _by_cells(grid: np.ndarray, cells: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return an order of samples, cell by cell, and where cells begin in it."""
     column, row = np.clip(np.floor((grid.T + 0.5) * cells), -1, cells).astype(int) + 1
-    order = np.argsort(row * (cells + 2) + column, kind='stable')
-    counts = np.bincount(row * (cells + 2) + column)
-    first = np.cumsum([0, *counts[:-1]])
-    of_cells = np.add.reduceat(scores[:, order], first, axis=1)
-    inverse = np.linalg.inv(normal)
-    size = normal.shape[1]
-    freedom = (len(counts) / (len(counts) - size)) ** 2
-    of_all = inverse @ (np.swapaxes(of_cells, 1, 2) @ of_cells) @ inverse
+    cell = row * (cells + 2) + column
+    order = np.argsort(cell, kind='stable')
+    return order, np.flatnonzero(np.diff(cell[order], prepend=-1))
+
+
+def _covariance(frames: np.ndarray, normals: np.ndarray, sums: np.ndarray) -> np.ndarray:
+    """Return the covariances of centres, px^2, from what the samples of each cell sum up to."""
+    inverse = np.linalg.inv(normals)
+    count = sums.shape[2]
+    freedom = (count / (count - _UNKNOWNS)) ** 2
+    of_all = inverse @ (sums @ np.swapaxes(sums, 1, 2)) @ inverse
     centre = of_all[:, [[2, 2], [5, 5]], [[2, 5], [2, 5]]]
     scale = frames[:, 2, 2, None, None]
     along = frames[:, :2, :2] / scale
