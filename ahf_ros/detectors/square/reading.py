@@ -40,8 +40,8 @@ _PART_WEIGHT = 0.15  # of each part of a cell, which have one colour in other qu
 _BORDER_WEIGHT = 0.3  # of the cells of the border, which are alike in other quadrilaterals, too
 _CORNER_WEIGHT = 0.7
 _DOUBT = 6.0  # logarithmic odds against a marker that nothing but a quadrilateral speaks for
-_POSSIBLE = -15.0  # minimum of these odds where all is as usual but a corner or the blur
-_CLEAR = -5.0  # maximum of the odds of other markers where these odds are low
+_POSSIBLE = -12.0  # minimum of these odds where all is as usual but a corner or the blur
+_CLEAR = -6.0  # maximum of the odds of other markers where these odds are low
 _PLAIN = 0.35  # logarithmic odds against a marker, for each edge less than random cells have
 
 MINIMUM_ODDS = 2.2
