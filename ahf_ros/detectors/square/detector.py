@@ -163,7 +163,12 @@ def _laid(
 ) -> np.ndarray:
     """Return the corners of prints that lie over the image where readings are doubtful."""
     order = np.argsort(-readings[:, 3], kind='stable')
-    own = order[owners(len(order), _one_place(corners[order]))]
+    markers, one_place = readings[order, :2], _one_place(corners[order])
+
+    def same(index: int) -> np.ndarray:
+        return one_place(index) & (markers == markers[index]).all(axis=1)
+
+    own = order[owners(len(order), same)]
     own = own[readings[own, 3] <= MINIMUM_ODDS]
     found = [np.zeros((0, 4, 2))]
     group, number, border = readings[own, :3].T.astype(int)
