@@ -35,6 +35,7 @@ def drawn(corners: np.ndarray = CORNERS, light: np.ndarray | float = 200.0) -> n
     shown = cv2.resize(0.2 + 0.8 * shown, (side, side), interpolation=cv2.INTER_AREA)
     return (cv2.GaussianBlur(shown, (0, 0), 0.6) * light).astype(np.float32)
 
+
 def test_corners_of_a_small_marker():
     found = lay_prints(drawn(), Sides.unmeasured((CORNERS + ROUGH / 2)[None]), ink()[None])
     assert np.abs(found.corners[0] - CORNERS).max() < 0.06
@@ -73,5 +74,6 @@ def test_sides_are_kept_where_light_is_uneven():
 def test_markers_at_the_border_of_the_image_and_none_at_all():
     found = lay_prints(drawn()[:, 14:], Sides.unmeasured((CORNERS - (14, 0))[None]), ink()[None])
     assert found.share[0] == 0
-    assert len(lay_prints(drawn(), Sides.unmeasured(np.zeros((0, 4, 2))), ink()[None][:0]).corners) == 0
+    none = Sides.unmeasured(np.zeros((0, 4, 2)))
+    assert len(lay_prints(drawn(), none, ink()[None][:0]).corners) == 0
     assert len(lay_outlines(drawn(), np.zeros((0, 4, 2)))) == 0

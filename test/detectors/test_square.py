@@ -155,6 +155,16 @@ def test_markers_of_ten_pixels_are_read_in_sharp_images():
     assert [it.id for it in found] == list(range(6))
 
 
+@pytest.mark.parametrize(('family', 'least'), [('apriltag_36h11', 16), ('aruco_6x6_250', 18)])
+def test_small_markers_whose_ink_has_grown(family, least):
+    """Doubtful ones are read where their prints lie; none is one with a border of two cells."""
+    size = {'width': 1600, 'height': 1200, 'targets': 20, 'dot_radius': 10 / 3, 'seed': 1}
+    shown = scene(family, **size, edge_shift=0.5)
+    right, wrong, false = counted(shown, create_detector(family=family)(shown.image))
+    assert right >= least
+    assert wrong == false == 0
+
+
 @pytest.mark.parametrize('gray', [0, 90, 255])
 def test_a_covered_marker_is_read(gray):
     shown = scene(family='apriltag_36h11')

@@ -145,9 +145,7 @@ def _grid(marker: SquareMarker) -> tuple[int, int]:
     return words(marker.family).shape[1] + 2 * marker.border, marker.border
 
 
-def _read(
-    gray: np.ndarray, corners: np.ndarray, groups: Groups
-) -> tuple[np.ndarray, np.ndarray]:
+def _read(gray: np.ndarray, corners: np.ndarray, groups: Groups) -> tuple[np.ndarray, np.ndarray]:
     """Return the corners of readings, shape (k, 4, 2), and their columns, (k, 5)."""
     found = read(gray, corners, groups)
     turned = [
