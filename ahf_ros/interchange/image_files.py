@@ -31,6 +31,7 @@ MAXIMUM_BYTES = 2**31 - 1
 UPRIGHT = 1
 """Orientation of an image whose first row is the upper one and whose first column is the left."""
 
+_LAST_ORIENTATION = 8
 _PNG = b'\x89PNG\r\n\x1a\n'
 _WIDTH, _HEIGHT, _ORIENTATION = 256, 257, 274  # tags of TIFF
 _FRAMES = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}  # JPEG markers with the size
@@ -92,7 +93,7 @@ def read_noted_image(path: str | Path, *, upright: bool = False) -> NotedImage:
     """Return an image as `read_image` does, with what there is to say about its file."""
     check_regular(path, MAXIMUM_BYTES)
     noted = _decoded(read_bytes(path), str(path))
-    if noted.orientation == UPRIGHT:
+    if not UPRIGHT < noted.orientation <= _LAST_ORIENTATION:  # cameras write 0 for none
         return noted
     if upright:
         image = as_oriented(noted.image, noted.orientation)

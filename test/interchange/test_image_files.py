@@ -154,8 +154,9 @@ def test_the_orientation_is_reported(tmp_path: Path, capfd: pytest.CaptureFixtur
     assert read_noted_image(path).note.startswith(f'{path}: orientation 6 is not applied')
     assert main(['identify', str(path), '--detector', 'traditional']) == 0
     assert 'orientation 6 is not applied' in capfd.readouterr().err
-    path.write_bytes(tiff(GRAY, 1))
-    assert read_noted_image(path).note == ''
+    for none in (0, 1, 9):
+        path.write_bytes(tiff(GRAY, none))
+        assert read_noted_image(path, upright=True).note == ''
 
 
 @pytest.mark.parametrize('suffix', ['.png', '.jpg', '.bmp', '.tif'])
