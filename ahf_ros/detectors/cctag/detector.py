@@ -18,26 +18,28 @@ import numpy as np
 from ahf_ros.blas import one_blas_thread
 from ahf_ros.codes import CCTAG_NAMES
 from ahf_ros.codes.cctag import CircleFamily, circle_family
+from ahf_ros.detectors.cctag.glance import Glance, likely_rings
 from ahf_ros.detectors.cctag.light import EDGES
-from ahf_ros.detectors.cctag.rings import Aligned, Prior, align, identify, in_light, likely_rings
+from ahf_ros.detectors.cctag.rings import Aligned, Prior, align, identify, in_light
 from ahf_ros.detectors.claims import best_targets
 from ahf_ros.detectors.contract import FamilyDetector, moved_targets
 from ahf_ros.features import frame
 from ahf_ros.features.candidates import find_peaks
 from ahf_ros.features.dot_search import voted_dots, whole_dots
-from ahf_ros.features.dots import NO_DOTS, Dots
+from ahf_ros.features.dots import Dots
 from ahf_ros.features.ellipse_targets import ellipse_fields, targets_from_frames
 from ahf_ros.features.large_targets import targets_of_octaves
-from ahf_ros.features.log_edges import LogEdges, find_edges
+from ahf_ros.features.log_edges import find_edges
 from ahf_ros.features.pyramid import ImagePyramid, Octave, image_pyramid
 from ahf_ros.imaging.image import as_gray, check_image
 from ahf_ros.target import UNDECODED, Target, sorted_targets
 
 _GAIN = 2  # of ln I, for circles that blur makes gray
 _INNERMOST = 0.25  # of the radii of circles that are looked for
-_COMMON_CENTRE = (8.0, 11.3), (11.3, 20.0)  # radii of targets whose rings vote together, px
-_COMMON_CENTRE_STEP, _COMMON_CENTRE_VOTES, _COMMON_CENTRE_SIZES = 1.0, 1.0, 1.25
+_COMMON_CENTRE = 8.0, 20.0  # radii of targets whose rings vote together, px
+_FACING = 11.5  # distance up to which they vote, px
 _FAINT = 3.0  # of their contrast, which narrow rings have little of
+_MOST_FAINT = 0.1  # share of pixels on such edges; of more, the strongest are taken
 _TELLING = 0.98  # confidence of targets that tell of others
 _CLEAR_OF_RIVALS = 19.0  # odds of the place of an ID against all others
 _SURE = 0.999  # confidence of targets that neither rivals nor another family put in doubt
@@ -111,11 +113,10 @@ class CctagDetector(FamilyDetector):
         """Return the targets of an octave, in its pixels."""
         gray = octave.pyramid.gray
         found = []
-        every, centres = _circles(octave), _common_centres(octave)
+        glances = [Glance.at(gray, _circles(octave)), *_common_centres(octave)]
         for polarity in self.settings.polarities:
-            circles = Dots.joined([every, replace(centres, polarity=centres.polarity + polarity)])
             for family in self.design:
-                frames = likely_rings(gray, circles, octave.radii, polarity, family)
+                frames = likely_rings(glances, octave.radii, polarity, family)
                 rings, light = _identified(gray, frames, polarity, family)
                 rings = _single(_together(rings))
                 found += self._shown(_owned(light, rings, polarity, family), family.name)
@@ -273,39 +274,34 @@ def _circles(octave: Octave) -> Dots:
     return Dots.joined(found)
 
 
-def _common_centres(octave: Octave) -> Dots:
-    """Return circles of several radii, about the points that the edges of many circles face.
+def _common_centres(octave: Octave) -> list[Glance]:
+    """Return a glance at circles about the points that the edges of many circles face.
 
     Narrow rings are too close for a dot to be told from the next, and blur takes their contrast.
     What they share is the centre. The colour is unknown.
     """
-    if octave.level:
-        return NO_DOTS
+    low, high = max(octave.radii[0], _COMMON_CENTRE[0]), min(octave.radii[1], _COMMON_CENTRE[1])
+    if octave.level or low >= high:
+        return []
     log = octave.pyramid.logs[0]
     edges = find_edges(cv2.addWeighted(log, _FAINT, log, 0.0, -_FAINT * cv2.mean(log)[0]))
-    found = [NO_DOTS]
-    for low, high in _COMMON_CENTRE:
-        low, high = max(octave.radii[0], low), min(octave.radii[1], high)
-        if low < high:
-            found.append(_centres(edges.curved(2 * high), low, high))
-    return Dots.joined(found)
-
-
-def _centres(edges: LogEdges, low: float, high: float) -> Dots:
-    """Return circles of radii between bounds, about what edges within the upper one face."""
-    steps = np.arange(_COMMON_CENTRE_STEP, high, _COMMON_CENTRE_STEP, dtype=np.float32)
+    edges = edges.curved(2 * high)
+    most = int(_MOST_FAINT * log.size)
+    if len(edges.x) > most:
+        weakest = np.partition(edges.strength, -most)[-most]
+        edges = edges.select(edges.strength >= weakest)
+    steps = np.arange(1, _FACING, dtype=np.float32)
     steps = np.concatenate([-steps, steps])[:, None]
     margin = int(high) + 2
     columns = (edges.x + np.float32(margin + 0.5) + steps * edges.unit_x).astype(np.int32).ravel()
     rows = (edges.y + np.float32(margin + 0.5) + steps * edges.unit_y).astype(np.int32).ravel()
     tall, wide = (side + 2 * margin for side in edges.marked.shape)
-    needed = _COMMON_CENTRE_VOTES * 2 * np.pi * low
-    peaks = find_peaks(columns, rows, (1, tall, wide), needed, int(low / 2))
-    radii = np.exp(np.arange(np.log(low), np.log(high), np.log(_COMMON_CENTRE_SIZES)))
-    x, y = (np.repeat(of - margin, len(radii)) for of in (peaks.x, peaks.y))
-    size = np.tile(radii, len(peaks.x))
+    peaks = find_peaks(columns, rows, (1, tall, wide), 2 * np.pi * low, int(low / 2))
+    x, y = (of - margin for of in (peaks.x, peaks.y))
+    size = np.full(len(x), low)
     frames = frame.affine_frames(x, y, size, size, np.zeros(len(x)))
-    return Dots(frames, np.zeros(len(x), int), np.ones(len(x)))
+    centres = Dots(frames, np.zeros(len(x), int), np.ones(len(x)))
+    return [Glance.at(octave.pyramid.gray, centres, high / low)]
 
 
 def _doubled(pyramid: ImagePyramid) -> ImagePyramid:

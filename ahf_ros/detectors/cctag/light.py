@@ -66,7 +66,6 @@ class Lights(ArrayRecord):
     heights: np.ndarray  # (k, 2 + e), of ln I: slopes, and edges, 0 for none
     edges: np.ndarray  # (k, e, 5): direction, rad, offset, curvature, height, ln of width
     slope: np.ndarray  # (k, n), of what is the same all around, by the radius
-    uneven: np.ndarray  # (k,), variance that is left on circles, of that of their means
     moved: np.ndarray  # (k, 3, 3), frames in the middle of what is the same all around
 
     def at(self, frames: np.ndarray, angles: np.ndarray, radii: np.ndarray) -> np.ndarray:
@@ -96,11 +95,11 @@ class Lights(ArrayRecord):
         """
         count, size = len(frames), frame.mean_radii(frames)
         edges, heights = np.zeros((count, EDGES, 5)), np.zeros((count, _OTHERS + EDGES))
-        slope, left = np.zeros((count, len(_RADII)), np.float32), np.zeros(count)
+        slope = np.zeros((count, len(_RADII)), np.float32)
         if count:
             scene = _Scene.of(gray, frames, size)
             fit = scene.fit(edges[:, :0])
-            slope[:], left[:], heights[:, :_OTHERS] = scene.slope, fit.variance, fit.heights
+            slope[:], heights[:, :_OTHERS] = scene.slope, fit.heights
             tilt = np.einsum('ks,smn->kmn', fit.heights[:, :2], np.stack([_X, _Y]))
             plain = _less_means(scene.values - tilt, scene.weight, _PAPER)
             rows = np.arange(count)
@@ -117,14 +116,12 @@ class Lights(ArrayRecord):
             rows, more = rows[better], more.select(better)
             scene = scene.select(better).in_light(more)
             fit = scene.fit(more.edges)
-            slope[rows], left[rows] = scene.slope, fit.variance
-            edges[rows, : number + 1] = fit.edges
+            slope[rows], edges[rows, : number + 1] = scene.slope, fit.edges
             heights[rows, : _OTHERS + number + 1] = fit.heights
         changes = np.zeros((count, 5))
         changes[:, _MOVES] = np.clip(heights[:, 2:_OTHERS], -_MOST_MOVED, _MOST_MOVED)
         of_light = np.delete(heights, np.s_[2:_OTHERS], axis=1)
-        uneven = left / _power(slope)
-        return Lights(frames, of_light, edges, slope, uneven, frame.moved(frames, changes))
+        return Lights(frames, of_light, edges, slope, frame.moved(frames, changes))
 
 
 def lit(gray: np.ndarray, frames: np.ndarray, lights: Lights) -> Seen:
@@ -360,11 +357,3 @@ def _slopes(values: np.ndarray, weight: np.ndarray) -> np.ndarray:
     means = (weight * values).sum(axis=1) / weight.sum(axis=1)
     slopes: np.ndarray = np.gradient(means, _STEP, axis=1).astype(np.float32)
     return slopes
-
-
-def _power(slopes: np.ndarray) -> np.ndarray:
-    """Return the variances, (k,), of what has slopes (k, n) by the radius."""
-    profiles, share = slopes.cumsum(axis=1) * _STEP, _RADII / _RADII.sum()
-    away = profiles - (profiles @ share)[:, None]
-    power: np.ndarray = np.maximum(away**2 @ share, _LEAST_VARIANCE)
-    return power

@@ -146,11 +146,15 @@ def _as_seen(seen: Seen, model: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     What is seen between pixels is interpolated after they are clipped.
     """
     shown = np.clip(model, seen.lowest, seen.highest)
-    radii = np.arange(model.shape[2])
-    beside = [(radii + side * seen.apart[:, None]).clip(0, radii[-1])[:, None] for side in (-1, 1)]
+    last = model.shape[2] - 1
 
     def mixed(values: np.ndarray) -> np.ndarray:
-        before, after = (np.take_along_axis(values, at, axis=2) for at in beside)
-        return values + seen.mixed * ((before + after) / 2 - values)
+        between = np.empty_like(values)
+        for apart in np.unique(seen.apart).tolist():
+            some = np.flatnonzero(seen.apart == apart)
+            beside = [(np.arange(last + 1) + side).clip(0, last) for side in (-apart, apart)]
+            before, after = (values[some][..., at] for at in beside)
+            between[some] = (before + after) / 2
+        return values + seen.mixed * (between - values)
 
     return seen.values - mixed(shown), mixed((shown == model).astype(np.float32))

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from itertools import product
 
 import numpy as np
@@ -21,33 +20,32 @@ from ahf_ros.detectors.cctag.rays import (
     ANGLES,
     PROFILE,
     Rays,
+    Seen,
     robust_rays,
+)
+from ahf_ros.detectors.cctag.templates import (
+    CLIPPED,
+    MASK,
+    MAXIMUM_SHIFT,
+    Edge,
+    less_lines,
+    rings_along,
+    shares_of,
+    size_steps,
+    templates,
+    two_discs,
 )
 from ahf_ros.features import frame
 from ahf_ros.features.array_record import ArrayRecord
-from ahf_ros.features.dots import Dots
 from ahf_ros.features.logistic import logistic
 from ahf_ros.features.normal import normal_integral
 from ahf_ros.features.robust import NORMAL
-from ahf_ros.features.sampling import sample_circles
 
-_FEW_ANGLES, _FEW_RADII = ANGLES[::2], 2  # of a glance: one of so many radii
-_CLIPPED = 0.25, 0.5  # shares of the contrast that over-exposure clips
-_GLANCED = (
-    *((0.0, more, 0.0) for more in (0.0, 1.0)),
-    *((shift, 0.0, share) for shift in (-0.4, 0.0) for share in _CLIPPED),
-)  # edges: growth of what is dark, px, sharpening, and the share that is clipped
-_GLANCED_BLUR = 0.9  # px
-_SIZES = 1.05  # ratio of radii that share templates, and of hypotheses of the radius
 _TRIED_SHIFTS = -1.2, -0.6, 0.0, 0.6, 1.2  # deviations
 _TRIED_BLURS, _TRIED_SHARPENINGS = (-1.0, 0.0, 1.4), (3.0, 7.0)  # the same
 _GROWN = (0.85, 0.9, 0.95, 1.0, 1.05)  # radii of the outermost circle, where that was found
-_NARROWEST = 0.5  # ring that is read, px; blur hides others
-_PROMISING = 0.6  # share of a profile that rings explain, from which they are looked at
-_LOOKED_AT = 2  # frames for an ID, at the most
-_APART = 0.2  # distance of the centres of different frames, radii
 _PART = 2048, 48  # hypotheses and targets at a time, which bounds the memory
-_UNEVEN = 0.5  # variance on circles, of that of their means, from which frames are none
+_SHARED = 0.55  # share of what rays show, that is the same on all, from which they are read
 _GAMMA = 2.2  # of gray values, unless they are light
 _CLEARLY = 0.03  # `left` by which rings must be better explained
 _TELLING_OF_GAMMA = 16  # targets
@@ -55,6 +53,8 @@ _ENOUGH = 4  # certain targets, that tell of the edges of an image
 _OF_CAMERA = 0.03  # standard deviation of the sharpening of one camera
 _OF_IMAGE = 0.1, 0.1, _OF_CAMERA  # of growth, ln of the blur and sharpening, of an image's targets
 _SCALES = (0.93, 0.965, 1.0, 1.035, 1.07)  # of the radius, about a frame
+_ALIKE = 0.9  # share of the mean of rays, that some ID explains
+_UNLIKE_DISCS = -1.0  # ln of what is left by two discs, less that of the ID
 _READINGS = 5  # IDs that are brought onto the image from a frame
 _REPEATS, _STAYING = 6, 0.1  # until the square of a move is a small part of the variance
 _OUTLIERS = 12.0, 6.0, 3.0, 3.0  # deviations that quarter a weight, in rounds of Gauss-Newton
@@ -64,8 +64,6 @@ _LEAST_TILT = 0.1  # tangent of the tilt that a circular target may have
 _LEAST_VARIANCE = 1e-6  # of gray values, of their mean
 _OF_VARIANCE = 2.0  # of gray values, that their model adds
 _SHARPEST, _SOFTEST = 0.35, 1.5  # blur: px, and in narrow rings, which more of it would hide
-_MOST_SHIFT = 0.45  # of edges, in narrow rings
-_SHARPENED = 1.5  # standard deviation of the unsharp mask of a camera that sharpens, px
 _SHARPENINGS = 0.0, 4.0  # amounts of it
 _HELD = 1e9  # weight of a bound
 _MOST_OF_EDGES = 0.3, 0.3, 1.0  # change of shift, ln of the blur and sharpening in a round
@@ -85,13 +83,6 @@ _AS_CLEAR = -6.0  # as it gets, by anything that is round
 _HOPELESS = 1e-6, 1e-4  # probabilities of a target, up to which one ID and few IDs are enough
 _FEW_READINGS = 2  # IDs that are brought onto the image before the others
 _OF_ID = np.array([-1.4, 1.2])  # of one, margin
-
-
-Edge = tuple[float, float, float, float]
-"""Growth of ink and blur, px, sharpening, and the share of the contrast that is clipped.
-
-Below 0 it is clipped from bright ink, otherwise from bright paper.
-"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,7 +116,7 @@ class Prior:
         of_shift, of_blur, of_sharpening = self.deviations
         tried = list(product(_TRIED_SHIFTS, _TRIED_BLURS, [(0.0, 0.0)]))
         others = [(more, 0.0) for more in _TRIED_SHARPENINGS]
-        others += [(0.0, polarity * of) for of in _CLIPPED if polarity]
+        others += [(0.0, polarity * of) for of in CLIPPED if polarity]
         tried += list(product(_TRIED_SHIFTS[::2], [0.0], others))
         return tuple(
             (
@@ -216,146 +207,10 @@ NOTHING = Aligned(
 )
 
 
-def likely_rings(
-    gray: np.ndarray,
-    circles: Dots,
-    radii: tuple[float, float],
-    polarity: int,
-    family: CircleFamily,
-) -> np.ndarray:
-    """Return the frames of outermost circles whose mean profile looks like rings, (k, 3, 3).
-
-    Any circle of a target may be among the circles. The bounds are those of the semi-major axis.
-    An ID is there once, so that some times as many frames are enough, those most like rings.
-    """
-    table = family.radii(family.numbers)
-    outer = circles.frames[circles.polarity == polarity]
-    inner = circles.frames[circles.polarity != polarity]
-    low, high = np.log([table[:, 1::2].min(), table[:, 1::2].max()])
-    steps = np.exp(np.arange(low, high, np.log(_SIZES)))
-    found = [frame.scaled(outer, np.full(len(outer), of)) for of in _GROWN]
-    found += [frame.scaled(inner, np.full(len(inner), 1 / of)) for of in steps]
-    frames = np.concatenate(found)
-    major = frame.ellipse_axes(frames)[0]
-    frames = frames[(major >= radii[0]) & (major <= radii[1])]
-    frames = frames[frame.mean_radii(frames) * family.narrow >= _NARROWEST]
-    starts = range(0, len(frames), _PART[0])
-    share = np.concatenate(
-        [np.zeros(0)]
-        + [_glance(gray, frames[start : start + _PART[0]], polarity, family) for start in starts]
-    )
-    size, centres = frame.mean_radii(frames), frames[:, :2, 2]
-    kept: list[int] = []
-    evidence = np.where(share < _PROMISING, 0, -size * np.log1p(-share))
-    for index in np.argsort(-evidence, kind='stable').tolist():
-        if not evidence[index] or len(kept) == _LOOKED_AT * len(table):
-            break
-        away = np.hypot(*(centres[kept] - centres[index]).T)
-        if not (away < _APART * np.maximum(size[kept], size[index])).any():
-            kept.append(index)
-    return frames[kept]
-
-
-def _glance(
-    gray: np.ndarray, frames: np.ndarray, polarity: int, family: CircleFamily
-) -> np.ndarray:
-    """Return the share of the mean profiles of frames that the rings of some ID explain, (k,)."""
-    profiles = _profiles(gray, frames, polarity, _FEW_ANGLES, PROFILE[::_FEW_RADII])
-    edges = tuple(
-        (polarity * shift, _GLANCED_BLUR, more, polarity * of) for shift, more, of in _GLANCED
-    )
-    share = np.zeros(len(frames))
-    for step, some in _by_size(frames):
-        templates = _templates(family, step, edges, _FEW_RADII)[0]
-        rings = _shares(profiles[some], templates, _FEW_RADII, 0).max(axis=1)
-        discs = _shares(profiles[some], _discs(step, edges), _FEW_RADII).max(axis=1)
-        share[some] = np.where(rings > discs, rings, 0.0)
-    return share
-
-
 def _by_size(frames: np.ndarray) -> list[tuple[int, np.ndarray]]:
     """Return steps of the radius, and the indices of the frames that have it."""
-    size = np.maximum(frame.mean_radii(frames), 1.0)
-    steps = np.rint(np.log(size) / np.log(_SIZES)).astype(int)
+    steps = size_steps(frame.mean_radii(frames))
     return [(step, np.flatnonzero(steps == step)) for step in np.unique(steps).tolist()]
-
-
-def _profiles(
-    gray: np.ndarray, frames: np.ndarray, polarity: int, angles: np.ndarray, along: np.ndarray
-) -> np.ndarray:
-    """Return the mean profiles of rays, each in its own light, ink downwards, shape (k, n)."""
-    values = np.maximum(sample_circles(gray, frames, angles, along), 0)
-    values /= np.maximum(values.mean(axis=2, keepdims=True), 1)
-    means: np.ndarray = polarity * values.mean(axis=1, dtype=np.float64)
-    return means
-
-
-def _shares(
-    profiles: np.ndarray, templates: np.ndarray, every: int = 1, most: float = np.inf
-) -> np.ndarray:
-    """Return the shares of profiles (k, n) that templates (t, n) explain, shape (k, t).
-
-    The product of a template with what it explains is at most so large; ink is below paper.
-    """
-    weight, line = _weights(every)
-    profiles = profiles * weight
-    profiles -= (profiles @ line) @ line.T
-    total = np.maximum((profiles**2).sum(axis=1, keepdims=True), 1e-9)
-    shares: np.ndarray = np.minimum(profiles @ templates.T, most) ** 2 / total
-    return shares
-
-
-@lru_cache
-def _weights(every: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return the weights of profiles, (n,), and a basis of weighted straight lines, (n, 2)."""
-    along = PROFILE[::every]
-    weight = np.sqrt(along / along.sum())
-    line, _ = np.linalg.qr(np.stack([weight, along * weight], axis=1))
-    return weight, line
-
-
-def _normalised(inks: np.ndarray, every: int) -> np.ndarray:
-    """Return weighted inks less straight lines, with squares of a sum of 1."""
-    weight, line = _weights(every)
-    inks = inks * weight
-    inks -= (inks @ line) @ line.T
-    normalised: np.ndarray = inks / np.linalg.norm(inks, axis=1, keepdims=True)
-    return normalised
-
-
-@lru_cache(maxsize=256)
-def _templates(
-    family: CircleFamily, step: int, edges: tuple[Edge, ...], every: int = 1
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return the ink of all IDs with some edges, shape (t, n), and these edges, (e, 3)."""
-    size, table = _SIZES**step, family.radii(family.numbers)
-    # IDs share circles, so that there are few to compute.
-    signed, inverse = np.unique((table * _signs(table)).round(6), return_inverse=True)
-    most = _MOST_SHIFT * family.narrow * size
-    tried = dict.fromkeys((float(np.clip(of[0], -most, most)), *of[1:]) for of in edges)
-    inks = []
-    for *edge, clipped in tried:
-        of_circles = (np.full(len(signed), of) for of in (size, *edge))
-        circles = _circles(signed[:, None], *of_circles)[0][:, ::every]
-        inks.append(_clipped(circles[inverse.reshape(table.shape)].sum(axis=1), clipped))
-    return _normalised(np.concatenate(inks), every), np.array([edge[:3] for edge in tried])
-
-
-@lru_cache(maxsize=64)
-def _discs(step: int, edges: tuple[Edge, ...]) -> np.ndarray:
-    """Return the profiles of single discs of all radii, shape (t, n), as for a glance."""
-    radii = np.linspace(PROFILE[0], PROFILE[-1], 100)[3:-3, None]
-    inks = []
-    for *edge, clipped in edges:
-        of_discs = (np.full(len(radii), of) for of in (_SIZES**step, *edge))
-        inks.append(_clipped(_circles(radii, *of_discs)[0][:, ::_FEW_RADII], clipped))
-    return _normalised(np.concatenate(inks), _FEW_RADII)
-
-
-def _clipped(inks: np.ndarray, share: float) -> np.ndarray:
-    """Return inks less a share of the contrast, below 0 of ink and otherwise of paper."""
-    clipped: np.ndarray = np.maximum(inks, share) if share > 0 else np.minimum(inks, 1 + share)
-    return clipped if share else inks
 
 
 def identify(
@@ -373,15 +228,19 @@ def identify(
     if not len(frames):
         return NOTHING
     lights = Lights.about(gray, frames, most)
-    lights = lights.select(lights.uneven < _UNEVEN)
+    lights = lights.select(_shared(lit(gray, lights.moved, lights)) >= _SHARED)
     if not len(lights.frames):
         return NOTHING
-    starts, ids, edges = _likely_ids(gray, lights, polarity, family, prior)
+    starts, ids, edges, rings = _likely_ids(gray, lights, polarity, family, prior)
+    if not rings.any():
+        return NOTHING
+    starts, ids, edges = (of[rings] for of in (starts, ids, edges))
+    lights = lights.select(rings)
     # The likeliest ID often brings the frame to its place even if it is the wrong one.
     first = align(gray, starts[:, 0], ids[:, 0], edges[:, 0], family, prior, lights)
     likely = first.of_target > _HOPELESS[0]
     lights = Lights.about(gray, first.frames[likely], most)
-    again = _likely_ids(gray, lights, polarity, family, prior)
+    again = _likely_ids(gray, lights, polarity, family, prior)[:3]
     starts, ids, edges = (
         np.concatenate([more, of[likely]], axis=1)
         for of, more in zip((starts, ids, edges), again, strict=True)
@@ -445,32 +304,50 @@ def _settled(
 
 def _likely_ids(
     gray: np.ndarray, lights: Lights, polarity: int, family: CircleFamily, prior: Prior
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return frames, (k, n, 3, 3), of IDs that profiles are like, (k, n), and edges, (k, n, 3)."""
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Return frames, (k, n, 3, 3), of IDs that profiles are like, (k, n), and edges, (k, n, 3).
+
+    The last are whether there may be rings of any ID, (k,).
+    """
     frames = lights.moved
     shape = len(_SCALES), len(frames), len(family.numbers)
     shares, edges = np.empty(shape), np.empty((*shape, 3))
+    better = np.empty(shape[:2])
     scaled = np.stack([frame.scaled(frames, np.full(len(frames), of)) for of in _SCALES])
-    for of_scale, share, edge in zip(scaled, shares, edges, strict=True):
+    for number, (of_scale, share, edge) in enumerate(zip(scaled, shares, edges, strict=True)):
         seen = lit(gray, of_scale, lights)
-        profiles = polarity * seen.values.mean(axis=1, dtype=np.float64)
+        profiles = less_lines(polarity * seen.values.mean(axis=1, dtype=np.float64))
         for step, of_size in _by_size(of_scale):
             for clipped in (0, 1):
                 some = of_size[seen.clipped[of_size] == clipped]
                 if not len(some):
                     continue
-                templates, tried = _templates(family, step, prior.tried(polarity * clipped))
-                found = _shares(profiles[some], templates, most=0)
+                of_rings, tried = templates(family, step, prior.tried(polarity * clipped))
+                found = shares_of(profiles[some], of_rings, most=0)
                 found = found.reshape(len(some), -1, len(family.numbers))
                 share[some], edge[some] = found.max(axis=1), tried[found.argmax(axis=1)]
+            of_two = two_discs(profiles[of_size], step)
+            left = 1 - share[of_size].max(axis=1)
+            better[number, of_size] = np.log(np.maximum(1 - of_two, 1e-6) / np.maximum(left, 1e-6))
+    share = shares.max(axis=(0, 2))
+    rows = np.arange(len(frames))
+    best = shares.max(axis=2).argmax(axis=0)
+    rings = (share >= _ALIKE) & (better[best, rows] >= _UNLIKE_DISCS)
     order = np.argsort(-shares.max(axis=0), axis=1, kind='stable')[:, :_READINGS]
     # Where narrow and wide rings take turns, growth of the ink makes one word the other.
     order = np.concatenate([order, family.numbers[-1] - order[:, :1]], axis=1)
-    rows = np.arange(len(frames))[:, None]
+    rows = rows[:, None]
     scale = shares.argmax(axis=0)[rows, order]
     found = edges[scale, rows, order]
     found[..., 1] = prior.blur
-    return scaled[scale, rows], order, found
+    return scaled[scale, rows], order, found, rings
+
+
+def _shared(seen: Seen) -> np.ndarray:
+    """Return the share of what rays show that is the same on all of them, shape (k,)."""
+    means, rays = less_lines(seen.values.mean(axis=1)), less_lines(seen.values)
+    shared: np.ndarray = (means**2).sum(axis=1) / (rays**2).sum(axis=2).mean(axis=1)
+    return shared
 
 
 def in_light(gray: np.ndarray, rings: Aligned, family: CircleFamily) -> np.ndarray:
@@ -528,7 +405,7 @@ def _aligned(
     for outlier in _OUTLIERS:
         size = frame.mean_radii(frames)
         seen = lit(gray, frames, lights)
-        ink, slope, *by_edges = _rings(family, ids, size, shift, blur, sharpening)
+        ink, slope, *by_edges = rings_along(family, ids, size, shift, blur, sharpening)
         rays = robust_rays(seen, ink, outlier)
         by_radius = [slope, slope * ALONG, slope * ALONG**2]
         normal, right = rays.equations(np.stack([*by_radius, *by_edges], axis=1), ink)
@@ -556,7 +433,7 @@ def _aligned(
         change = np.clip(change, -limit, limit)
         frames = frame.moved(frames, change[:, :7])
         narrow = family.narrow * size
-        shift = np.clip(shift + change[:, 7], -_MOST_SHIFT * narrow, _MOST_SHIFT * narrow)
+        shift = np.clip(shift + change[:, 7], -MAXIMUM_SHIFT * narrow, MAXIMUM_SHIFT * narrow)
         blur = np.clip(
             blur * np.exp(change[:, 8]), _SHARPEST, np.maximum(_SOFTEST * narrow, _SHARPEST)
         )
@@ -566,7 +443,7 @@ def _aligned(
     covariance = affine @ covariance @ affine.transpose(0, 2, 1) + _SYSTEMATIC**2 * np.eye(2)
     seen = lit(gray, frames, lights)
     size = frame.mean_radii(frames)
-    ink = _rings(family, ids, size, shift, blur, sharpening)[0]
+    ink = rings_along(family, ids, size, shift, blur, sharpening)[0]
     rays = Rays.of(seen, ink, np.broadcast_to(ALONG, seen.values.shape))
     squares = (of**2 @ ALONG for of in (rays.errors, rays.deviations(seen.values)))
     left, shown = (of.astype(np.float64) for of in squares)
@@ -611,10 +488,10 @@ def _hiding(
     shift: np.ndarray, sharpening: np.ndarray, known: np.ndarray, narrow: np.ndarray
 ) -> np.ndarray:
     """Return by how much growth, sharpening and clipping hide narrow rings of so many px, (k,)."""
-    grown = _GROWTH_HIDES * (shift / (_MOST_SHIFT * narrow)) ** 8
+    grown = _GROWTH_HIDES * (shift / (MAXIMUM_SHIFT * narrow)) ** 8
     sharpened = _SHARPENING_HIDES * sharpening**2 / (1 + np.abs(sharpening))
     others = sharpened + _CLIPPING_HIDES * (1 - known)
-    hidden: np.ndarray = grown + others * (_SHARPENED / narrow) ** 2
+    hidden: np.ndarray = grown + others * (MASK / narrow) ** 2
     return hidden
 
 
@@ -655,65 +532,3 @@ def _plain(seen: np.ndarray, rings: np.ndarray, good: np.ndarray, blur: np.ndarr
         share = (ink @ profile) ** 2 / max(ink @ ink, 1e-12) / total
         found[index] = np.log(max(1 - shares.max(), 1e-6) / max(1 - share, 1e-6))
     return found
-
-
-def _rings(
-    family: CircleFamily,
-    ids: np.ndarray,
-    size: np.ndarray,
-    shift: np.ndarray,
-    blur: np.ndarray,
-    sharpening: np.ndarray,
-) -> tuple[np.ndarray, ...]:
-    """Return the ink of IDs along the profile, shape (k, n), and its derivatives.
-
-    These are by the radius, in radii of the target, by the shift, px, by ln of the blur and by the
-    sharpening.
-    """
-    radii = family.radii(ids)
-    return _circles(_signs(radii) * radii, size, shift, blur, sharpening)
-
-
-def _circles(
-    signed: np.ndarray,
-    size: np.ndarray,
-    shift: np.ndarray,
-    blur: np.ndarray,
-    sharpening: np.ndarray,
-) -> tuple[np.ndarray, ...]:
-    """Return what `_rings` does, of circles of radii (k, c), below 0 where paper fills them."""
-    size, shift, blur, sharpening = (
-        of[:, None, None].astype(np.float32) for of in (size, shift, blur, sharpening)
-    )
-    signed = signed[..., None].astype(np.float32)
-    sign = np.sign(signed)
-    radii = np.abs(signed) * size + sign * shift
-    seen = _blurred(radii, sign, size, blur)
-    wide = np.hypot(blur, np.float32(_SHARPENED))
-    masked = _blurred(radii, sign, size, wide)
-    masked[3] *= ((blur / wide) ** 2)[:, 0]
-    more = sharpening[:, 0]
-    return *((1 + more) * of - more * less for of, less in zip(seen, masked, strict=True)), (
-        seen[0] - masked[0]
-    )
-
-
-def _blurred(
-    radii: np.ndarray, sign: np.ndarray, size: np.ndarray, blur: np.ndarray
-) -> list[np.ndarray]:
-    """Return the ink of circles of radii (k, c, 1), px, and its derivatives, shape (k, n) each."""
-    # Blur moves what lies near to the centre outwards, on the mean (Rice).
-    place = np.sqrt(ALONG**2 + (blur / size) ** 2)
-    away = (radii - place * size) / blur
-    density = sign * np.exp(-0.5 * away**2) / math.sqrt(2 * math.pi)
-    return [
-        (sign * normal_integral(away)).sum(axis=1),
-        -(density * size / blur).sum(axis=1),
-        (sign * density / blur).sum(axis=1),
-        -(density * away).sum(axis=1),
-    ]
-
-
-def _signs(radii: np.ndarray) -> np.ndarray:
-    """Return 1 for circles that ink fills, -1 for those that paper fills, from shape (k, n)."""
-    return np.where(np.arange(radii.shape[1]) % 2 == 0, np.float32(1), np.float32(-1))

@@ -1,0 +1,178 @@
+"""The ink of rings along the radius of a CCTag, and how much of a profile it explains."""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+
+import numpy as np
+
+from ahf_ros.codes.cctag import CircleFamily
+from ahf_ros.detectors.cctag.rays import ALONG, PROFILE
+from ahf_ros.features.normal import normal_integral
+
+SIZE_STEP = 1.05
+"""Ratio of radii that share templates."""
+MAXIMUM_SHIFT = 0.45
+"""Growth of ink, in narrow rings."""
+MASK = 1.5
+"""Standard deviation of the unsharp mask of a camera that sharpens, px."""
+
+Edge = tuple[float, float, float, float]
+"""Growth of ink and blur, px, sharpening, and the share of the contrast that is clipped.
+
+Below 0 it is clipped from bright ink, otherwise from bright paper.
+"""
+
+
+_USUAL_EDGE: Edge = (0.0, 0.9, 0.0, 0.0)
+CLIPPED = 0.25, 0.5
+"""Shares of the contrast that over-exposure clips."""
+
+
+def size_steps(size: np.ndarray) -> np.ndarray:
+    """Return the steps of radii, px, int, of the shape of these."""
+    steps: np.ndarray = np.rint(np.log(np.maximum(size, 1.0)) / math.log(SIZE_STEP)).astype(int)
+    return steps
+
+
+def less_lines(profiles: np.ndarray, every: int = 1) -> np.ndarray:
+    """Return weighted profiles less straight lines, float32, shape (k, n)."""
+    weight, line = _weights(every)
+    weighted = profiles * weight
+    weighted -= (weighted @ line) @ line.T
+    return weighted.astype(np.float32)
+
+
+def shares_of(profiles: np.ndarray, of_rings: np.ndarray, most: float = np.inf) -> np.ndarray:
+    """Return the shares of profiles (k, n) that templates (t, n) explain, shape (k, t).
+
+    Both are weighted and less straight lines. The product of a template with what it explains is
+    at most so large; ink is below paper.
+    """
+    total = np.maximum((profiles**2).sum(axis=1, keepdims=True), np.float32(1e-9))
+    shares: np.ndarray = np.minimum(profiles @ of_rings.T, np.float32(most)) ** 2 / total
+    return shares
+
+
+@lru_cache
+def _weights(every: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return the weights of profiles, (n,), and a basis of weighted straight lines, (n, 2)."""
+    along = PROFILE[::every]
+    weight = np.sqrt(along / along.sum())
+    line, _ = np.linalg.qr(np.stack([weight, along * weight], axis=1))
+    return weight, line
+
+
+def _normalised(inks: np.ndarray, every: int) -> np.ndarray:
+    """Return weighted inks less straight lines, with squares of a sum of 1, float32."""
+    inks = less_lines(inks, every)
+    normalised: np.ndarray = inks / np.linalg.norm(inks, axis=1, keepdims=True)
+    return normalised
+
+
+@lru_cache(maxsize=256)
+def templates(
+    family: CircleFamily, step: int, edges: tuple[Edge, ...], every: int = 1
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the ink of all IDs with some edges, shape (t, n), and these edges, (e, 3)."""
+    size, table = SIZE_STEP**step, family.radii(family.numbers)
+    # IDs share circles, so that there are few to compute.
+    signed, inverse = np.unique((table * _signs(table)).round(6), return_inverse=True)
+    most = MAXIMUM_SHIFT * family.narrow * size
+    tried = dict.fromkeys((float(np.clip(of[0], -most, most)), *of[1:]) for of in edges)
+    inks = []
+    for *edge, clipped in tried:
+        of_circles = (np.full(len(signed), of) for of in (size, *edge))
+        circles = _circles(signed[:, None], *of_circles)[0][:, ::every]
+        inks.append(_clipped(circles[inverse.reshape(table.shape)].sum(axis=1), clipped))
+    return _normalised(np.concatenate(inks), every), np.array([edge[:3] for edge in tried])
+
+
+@lru_cache(maxsize=256)
+def discs(step: int, edges: tuple[Edge, ...] = (_USUAL_EDGE,), every: int = 1) -> np.ndarray:
+    """Return the profiles of single discs of all radii, shape (t, n), as templates."""
+    radii = np.linspace(PROFILE[0], PROFILE[-1], 100)[3:-3, None]
+    inks = []
+    for *edge, clipped in edges:
+        of_discs = (np.full(len(radii), of) for of in (SIZE_STEP**step, *edge))
+        inks.append(_clipped(_circles(radii, *of_discs)[0][:, ::every], clipped))
+    return _normalised(np.concatenate(inks), every)
+
+
+def two_discs(profiles: np.ndarray, step: int) -> np.ndarray:
+    """Return the shares of profiles that two discs of any radii and grays explain, shape (k,)."""
+    of_discs = discs(step)
+    along, alike = profiles @ of_discs.T, of_discs @ of_discs.T
+    both = along[:, :, None] ** 2 + along[:, None] ** 2
+    both -= 2 * alike * along[:, :, None] * along[:, None]
+    shares: np.ndarray = (both / np.maximum(1 - alike**2, 1e-3)).max(axis=(1, 2))
+    return shares / np.maximum((profiles**2).sum(axis=1), 1e-9)
+
+
+def _clipped(inks: np.ndarray, share: float) -> np.ndarray:
+    """Return inks less a share of the contrast, below 0 of ink and otherwise of paper."""
+    clipped: np.ndarray = np.maximum(inks, share) if share > 0 else np.minimum(inks, 1 + share)
+    return clipped if share else inks
+
+
+def rings_along(
+    family: CircleFamily,
+    ids: np.ndarray,
+    size: np.ndarray,
+    shift: np.ndarray,
+    blur: np.ndarray,
+    sharpening: np.ndarray,
+) -> tuple[np.ndarray, ...]:
+    """Return the ink of IDs along the profile, shape (k, n), and its derivatives.
+
+    These are by the radius, in radii of the target, by the shift, px, by ln of the blur and by the
+    sharpening.
+    """
+    radii = family.radii(ids)
+    return _circles(_signs(radii) * radii, size, shift, blur, sharpening)
+
+
+def _circles(
+    signed: np.ndarray,
+    size: np.ndarray,
+    shift: np.ndarray,
+    blur: np.ndarray,
+    sharpening: np.ndarray,
+) -> tuple[np.ndarray, ...]:
+    """Return what `rings_along` does, of circles of radii (k, c), below 0 if paper fills them."""
+    size, shift, blur, sharpening = (
+        of[:, None, None].astype(np.float32) for of in (size, shift, blur, sharpening)
+    )
+    signed = signed[..., None].astype(np.float32)
+    sign = np.sign(signed)
+    radii = np.abs(signed) * size + sign * shift
+    seen = _blurred(radii, sign, size, blur)
+    wide = np.hypot(blur, np.float32(MASK))
+    masked = _blurred(radii, sign, size, wide)
+    masked[3] *= ((blur / wide) ** 2)[:, 0]
+    more = sharpening[:, 0]
+    return *((1 + more) * of - more * less for of, less in zip(seen, masked, strict=True)), (
+        seen[0] - masked[0]
+    )
+
+
+def _blurred(
+    radii: np.ndarray, sign: np.ndarray, size: np.ndarray, blur: np.ndarray
+) -> list[np.ndarray]:
+    """Return the ink of circles of radii (k, c, 1), px, and its derivatives, shape (k, n) each."""
+    # Blur moves what lies near to the centre outwards, on the mean (Rice).
+    place = np.sqrt(ALONG**2 + (blur / size) ** 2)
+    away = (radii - place * size) / blur
+    density = sign * np.exp(-0.5 * away**2) / math.sqrt(2 * math.pi)
+    return [
+        (sign * normal_integral(away)).sum(axis=1),
+        -(density * size / blur).sum(axis=1),
+        (sign * density / blur).sum(axis=1),
+        -(density * away).sum(axis=1),
+    ]
+
+
+def _signs(radii: np.ndarray) -> np.ndarray:
+    """Return 1 for circles that ink fills, -1 for those that paper fills, from shape (k, n)."""
+    return np.where(np.arange(radii.shape[1]) % 2 == 0, np.float32(1), np.float32(-1))
