@@ -54,7 +54,7 @@ _OF_CAMERA = 0.03  # standard deviation of the sharpening of one camera
 _OF_IMAGE = 0.1, 0.1, _OF_CAMERA  # of growth, ln of the blur and sharpening, of an image's targets
 _SCALES = (0.93, 0.965, 1.0, 1.035, 1.07)  # of the radius, about a frame
 _ALIKE = 0.9  # share of the mean of rays, that some ID explains
-_UNLIKE_DISCS = -1.0  # ln of what is left by two discs, less that of the ID
+_LIKE_DISCS = 12.0  # px: two discs leave less than rings of so many px, by a factor of e at most
 _READINGS = 5  # IDs that are brought onto the image from a frame
 _REPEATS, _STAYING = 6, 0.1  # until the square of a move is a small part of the variance
 _OUTLIERS = 12.0, 6.0, 3.0, 3.0  # deviations that quarter a weight, in rounds of Gauss-Newton
@@ -312,27 +312,23 @@ def _likely_ids(
     frames = lights.moved
     shape = len(_SCALES), len(frames), len(family.numbers)
     shares, edges = np.empty(shape), np.empty((*shape, 3))
-    better = np.empty(shape[:2])
+    profiles = np.empty((*shape[:2], len(PROFILE)), np.float32)
     scaled = np.stack([frame.scaled(frames, np.full(len(frames), of)) for of in _SCALES])
-    for number, (of_scale, share, edge) in enumerate(zip(scaled, shares, edges, strict=True)):
+    for of_scale, profile, share, edge in zip(scaled, profiles, shares, edges, strict=True):
         seen = lit(gray, of_scale, lights)
-        profiles = less_lines(polarity * seen.values.mean(axis=1, dtype=np.float64))
+        profile[:] = less_lines(polarity * seen.values.mean(axis=1, dtype=np.float64))
         for step, of_size in _by_size(of_scale):
             for clipped in (0, 1):
                 some = of_size[seen.clipped[of_size] == clipped]
                 if not len(some):
                     continue
                 of_rings, tried = templates(family, step, prior.tried(polarity * clipped))
-                found = shares_of(profiles[some], of_rings, most=0)
+                found = shares_of(profile[some], of_rings, most=0)
                 found = found.reshape(len(some), -1, len(family.numbers))
                 share[some], edge[some] = found.max(axis=1), tried[found.argmax(axis=1)]
-            of_two = two_discs(profiles[of_size], step)
-            left = 1 - share[of_size].max(axis=1)
-            better[number, of_size] = np.log(np.maximum(1 - of_two, 1e-6) / np.maximum(left, 1e-6))
-    share = shares.max(axis=(0, 2))
     rows = np.arange(len(frames))
-    best = shares.max(axis=2).argmax(axis=0)
-    rings = (share >= _ALIKE) & (better[best, rows] >= _UNLIKE_DISCS)
+    profile = profiles[shares.max(axis=2).argmax(axis=0), rows]
+    rings = _unlike_discs(profile, shares.max(axis=(0, 2)), frames)
     order = np.argsort(-shares.max(axis=0), axis=1, kind='stable')[:, :_READINGS]
     # Where narrow and wide rings take turns, growth of the ink makes one word the other.
     order = np.concatenate([order, family.numbers[-1] - order[:, :1]], axis=1)
@@ -341,6 +337,17 @@ def _likely_ids(
     found = edges[scale, rows, order]
     found[..., 1] = prior.blur
     return scaled[scale, rows], order, found, rings
+
+
+def _unlike_discs(profiles: np.ndarray, shares: np.ndarray, frames: np.ndarray) -> np.ndarray:
+    """Return whether rings explain shares of profiles, (k,), that two discs do not explain."""
+    of_two = np.empty(len(shares))
+    for step, of_size in _by_size(frames):
+        of_two[of_size] = two_discs(profiles[of_size], step)
+    left_by_two, left = (np.maximum(1 - of, 1e-6) for of in (of_two, shares))
+    better = np.log(left_by_two / left) >= -_LIKE_DISCS / frame.mean_radii(frames)
+    rings: np.ndarray = (shares >= _ALIKE) & better
+    return rings
 
 
 def _shared(seen: Seen) -> np.ndarray:
