@@ -285,7 +285,7 @@ def _common_centres(octave: Octave) -> list[Glance]:
         return []
     log = octave.pyramid.logs[0]
     edges = find_edges(cv2.addWeighted(log, _FAINT, log, 0.0, -_FAINT * cv2.mean(log)[0]))
-    edges = edges.curved(2 * high)
+    edges = edges.curved(2 * _FACING)
     most = int(_MOST_FAINT * log.size)
     if len(edges.x) > most:
         weakest = np.partition(edges.strength, -most)[-most]
