@@ -17,6 +17,7 @@ from support.scenes import counted, rendering
 SIZE = {'width': 560, 'height': 420, 'targets': 6, 'dot_radius': 14.0, 'seed': 2}
 
 LARGE = {'width': 640, 'height': 480}
+SOFT = {'width': 1000, 'height': 760}
 
 
 def scene(family: str = 'cctag3', **changes: object) -> Rendering:
@@ -38,6 +39,7 @@ def errors(shown: Rendering, found: list) -> np.ndarray:
         ('cctag3', {'dot_radius': 10.0}, 0.03),
         ('cctag3', {'dot_radius': 60.0, 'targets': 2}, 0.02),
         ('cctag3', {'tilt': 40.0, 'dot_radius': 20.0, 'targets': 4}, 0.03),
+        ('cctag3', {'blur': 2.0, 'dot_radius': 30.0, 'targets': 8, **SOFT}, 0.03),
         ('cctag3', {'edge_shift': 0.5}, 0.03),
         ('cctag3', {'edge_shift': -0.5, 'dot_radius': 24.0, 'targets': 4}, 0.03),
         (

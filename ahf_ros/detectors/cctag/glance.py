@@ -35,6 +35,7 @@ _EDGES: tuple[Edge, ...] = (
     *((0.0, 0.9, more, 0.0) for more in (0.0, 1.0)),
     *((shift, 0.9, 0.0, share) for shift in (-0.4, 0.0) for share in CLIPPED),
 )  # of dark ink
+_DEFOCUSED = 0.6  # blur, widths of narrow rings
 _INNERMOST, _RATIO = 0.12, 1.035  # radius from which an outermost circle is read, and to the next
 _OUTERMOST = range(-3, 2)  # steps of the radius to that of the outermost circle, where it is found
 _INNER = 0.15  # radius, of the outermost, of any other circle
@@ -100,7 +101,7 @@ class Glance:
         step = circles.step[row] + ups[up]
         order = np.lexsort((up, step))
         row, up, step = row[order], up[order], step[order]
-        edges = tuple((polarity * of[0], *of[1:3], polarity * of[3]) for of in _EDGES)
+        sharp = tuple((polarity * of[0], *of[1:3], polarity * of[3]) for of in _EDGES)
         resampled = [polarity * self._resampled(by) for by in self.steps]
         share = np.zeros(len(row))
         for some in _runs(step):
@@ -108,6 +109,8 @@ class Glance:
             profiles = np.concatenate(
                 [circles.profiles[row[some][of]] @ resampled[up[some][of][0]] for of in parts]
             )
+            soft = _DEFOCUSED * family.narrow * SIZE_STEP**size
+            edges = (*sharp, *[(0.0, soft, 0.0, 0.0)] * (soft > _EDGES[0][1]))
             of_rings = templates(family, size, edges, _EVERY)[0]
             rings = shares_of(profiles, of_rings, most=0).max(axis=1)
             likely = np.flatnonzero(rings >= _PROMISING)
