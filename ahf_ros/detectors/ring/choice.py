@@ -19,7 +19,7 @@ from ahf_ros.detectors.ring.proposals import HOPEFUL, bounds, measure_likely
 from ahf_ros.detectors.ring.reading import read_bands
 from ahf_ros.features.circle_fit import ENOUGH, Fit
 
-_CLEAREST = 32  # dots that tell the family of an image
+_CLEAREST = 32  # dots that tell the family of an image, or show a print
 _CLEAR = 0.5  # bound of the mean evidence of a reading, which spots of light hardly reach
 _SEVERAL = 3  # words that show a family where no dot is so clear
 _ROUGH = (0.0,)  # shifts of edges that are tried to find these, px
@@ -74,7 +74,8 @@ def _words_shown(
         # Whatever has a number of sectors has its multiples as well.
         same = [code for code in families if code.band == band and bits % code.bits == 0]
         words: list[tuple[Family, int]] = []
-        for some in _growing(np.flatnonzero(likely[best]), _SAMPLE):
+        order = np.argsort(-mean[best], kind='stable')
+        for some in _growing(order[likely[best, order]][:_CLEAREST], _SAMPLE):
             words += _read(gray, dots.select(some), same)
             if len(words) >= _SEVERAL or (words and mean[best, some].max() > _CLEAR):
                 return [words_of_print(code, word, tuple(families)) for code, word in words]
