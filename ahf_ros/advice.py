@@ -8,7 +8,7 @@ from __future__ import annotations
 import os
 import threading
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from statistics import median
@@ -24,8 +24,8 @@ from ahf_ros.detectors.contract import DetectorSettings
 from ahf_ros.detectors.ring.learning import LearntFamily, find_bands, learn_families
 from ahf_ros.doubt import repeated_remark
 from ahf_ros.edge_shift import edge_shift_remark, median_edge_shift
-from ahf_ros.filtering.settling import evident
-from ahf_ros.target import UNDECODED, Target, UndecodedTarget, repeated_targets
+from ahf_ros.filtering.settling import evident, still_shown
+from ahf_ros.target import UNDECODED, Target, repeated_targets
 from ahf_ros.text import counted
 
 LOOKED_AT = 3
@@ -88,11 +88,19 @@ class Adviser:
 
 
 def _lines(image: np.ndarray, settings: DetectorSettings, expected: int) -> Iterator[str]:
-    if repeated := _repeated(image, settings):
+    read: list[Target] = []
+    with suppress(ValueError):  # which the identification has said
+        read = create_detector(settings=settings)(image)
+    if repeated := repeated_targets(read):
         yield repeated_remark(repeated)
         return
     if learnt := _learnt(image):
         yield from _of_bands(learnt, 1, settings, expected)
+        return
+    if settings.family == AUTO and (likely := _likely(read)):
+        ((name, count),) = Counter(target.family for target in likely).most_common(1)
+        target = counted(count, 'target')
+        yield f'{target} may be of {name}, too few to be sure: --family {name}'
         return
     usual = replace(settings, family=AUTO, polarity='auto', min_radius=0.0, max_radius=1e4)
     others = set(usual.families) - set(settings.families)
@@ -108,16 +116,23 @@ def _lines(image: np.ndarray, settings: DetectorSettings, expected: int) -> Iter
     middle = _enlarged_middle(image)
     if learnt := _learnt(middle):
         yield from _of_bands(learnt, _ENLARGED, settings, expected)
-    elif small := _identified(middle, replace(settings, max_radius=1e4)):
+    elif small := _identified(middle, replace(settings, max_radius=_largest_told(settings))):
         radius = median(target.semi_major for target in small) / _ENLARGED
         yield _of_size(len(small), radius, settings.narrowed({it.family for it in small}))
 
 
-def _repeated(image: np.ndarray, settings: DetectorSettings) -> tuple[UndecodedTarget, ...]:
-    """Return the targets whose IDs are read in several places, so that none is reported."""
-    with suppress(ValueError):  # which the identification has said
-        return repeated_targets(create_detector(settings=settings)(image))
-    return ()
+def _likely(read: Sequence[Target]) -> list[Target]:
+    """Return the targets of families that may be there, also where one alone is no evidence."""
+    families = {it.family for it in read if it.id != UNDECODED}
+    likely = {name for name in families if still_shown([it for it in read if it.family == name])}
+    return [it for it in read if it.family in likely]
+
+
+def _largest_told(settings: DetectorSettings) -> float:
+    """Return the radius up to which dots of an enlarged image are worth a line, px."""
+    if settings.max_radius < DetectorSettings().max_radius:
+        return DetectorSettings().max_radius
+    return _ENLARGED * max(settings.narrowed([name]).radii[0] for name in settings.families)
 
 
 def _of_shared_prints(image: np.ndarray, settings: DetectorSettings) -> Iterator[str]:
@@ -126,7 +141,7 @@ def _of_shared_prints(image: np.ndarray, settings: DetectorSettings) -> Iterator
     widest = [code.name for code in codes if code.has_all_words]
     if not 0 < len(widest) < len(codes):
         return
-    found = evident(_identified(image, settings.narrowed(widest)))
+    found = _likely(_identified(image, settings.narrowed(widest)))
     shown = Counter(tuple(words_of_print(family(it.family), it.code, codes)) for it in found)
     for of_print, count in shown.most_common(1):
         names = sorted(code.name for code in of_print)

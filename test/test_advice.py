@@ -34,6 +34,11 @@ def shown(**changes: object) -> np.ndarray:
         ({}, {'family': 'apriltag_36h11'}, ['12 dots with a band of 12 sectors: --family met']),
         ({'targets': 2}, {'family': 'aicon14'}, ['2 targets of metashape12: --family met']),
         (
+            {'targets': 1},
+            {'family': 'auto'},
+            ['1 target may be of metashape12, too few to be sure'],
+        ),
+        (
             {'family': 'aicon12', 'targets': 3},
             {'family': 'aicon12,cct12'},
             ['3 targets of aicon12 or cct12: --family says which'],

@@ -19,11 +19,12 @@ from ahf_ros.detectors.ring.proposals import HOPEFUL, bounds, measure_likely
 from ahf_ros.detectors.ring.reading import read_bands
 from ahf_ros.features.circle_fit import ENOUGH, Fit
 
-_CLEAREST = 32  # dots that tell the family of an image, or show a print
+_CLEAREST = 32  # dots that tell the family of an image
 _CLEAR = 0.5  # bound of the mean evidence of a reading, which spots of light hardly reach
 _SEVERAL = 3  # words that show a family where no dot is so clear
 _ROUGH = (0.0,)  # shifts of edges that are tried to find these, px
 _SAMPLE = 8  # of those that seem to have a print, which are read first
+_LIKELIEST = 16  # dots to have a print, of which none shows that it is not there
 _MORE = 3  # times as many, where these show nothing
 _NEARLY = 0.05  # mean evidence of a reading, by which a print is as good as the best one
 _PRINTS = 3  # the most likely ones, which are tried on the same dots
@@ -75,7 +76,7 @@ def _words_shown(
         same = [code for code in families if code.band == band and bits % code.bits == 0]
         words: list[tuple[Family, int]] = []
         order = np.argsort(-mean[best], kind='stable')
-        for some in _growing(order[likely[best, order]][:_CLEAREST], _SAMPLE):
+        for some in _growing(order[likely[best, order]][:_LIKELIEST], _SAMPLE):
             words += _read(gray, dots.select(some), same)
             if len(words) >= _SEVERAL or (words and mean[best, some].max() > _CLEAR):
                 return [words_of_print(code, word, tuple(families)) for code, word in words]
