@@ -19,7 +19,7 @@ import numpy as np
 from ahf_ros.codes import RING_NAMES
 from ahf_ros.codes.families import AUTO, families_of
 from ahf_ros.codes.ring import FAMILY_NAMES, Family, family, words_of_print
-from ahf_ros.detectors import create_detector
+from ahf_ros.detectors import Contesting, create_detector
 from ahf_ros.detectors.contract import DetectorSettings
 from ahf_ros.detectors.ring.learning import LearntFamily, find_bands, learn_families
 from ahf_ros.doubt import repeated_remark
@@ -90,7 +90,10 @@ class Adviser:
 def _lines(image: np.ndarray, settings: DetectorSettings, expected: int) -> Iterator[str]:
     read: list[Target] = []
     with suppress(ValueError):  # which the identification has said
-        read = create_detector(settings=settings)(image)
+        detector = create_detector(settings=settings)
+        if isinstance(detector, Contesting):
+            detector = detector.contesting()
+        read = detector(image)
     if repeated := repeated_targets(read):
         yield repeated_remark(repeated)
         return

@@ -11,6 +11,7 @@ import numpy as np
 from ahf_ros.codes.families import AUTO, mirrored_number
 from ahf_ros.deprecation import deprecated_arguments
 from ahf_ros.detectors import (
+    Contesting,
     Detector,
     Drafter,
     EarlyStopping,
@@ -129,6 +130,8 @@ def _identifier(
     listed = settings.adaptive.listed
     if listed and isinstance(used, Detector) and isinstance(used, Expecting):
         used = used.expecting(listed)
+    if isinstance(used, Detector) and isinstance(used, Contesting):
+        used = used.contesting()
     return kind(
         used,
         settings.adaptive,

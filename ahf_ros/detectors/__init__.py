@@ -24,6 +24,7 @@ from ahf_ros.codes.families import (
 )
 from ahf_ros.deprecation import deprecated_arguments
 from ahf_ros.detectors.contract import (
+    Contesting,
     Detector,
     DetectorSettings,
     Drafter,
@@ -47,6 +48,7 @@ __all__ = [
     'DETECTOR_NAMES',
     'FAMILY_NAMES',
     'GROUP',
+    'Contesting',
     'Detector',
     'DetectorSettings',
     'Drafter',

@@ -144,6 +144,15 @@ class Expecting(Protocol):
 
 
 @runtime_checkable
+class Contesting(Protocol):
+    """A detector that can also return targets whose ID others have, too."""
+
+    def contesting(self) -> Detector:
+        """Return the same detector with these targets among its results, undecoded."""
+        ...
+
+
+@runtime_checkable
 class Searching(Protocol):
     """A detector that begins with the pyramid of an image, which detectors of one image share."""
 

@@ -16,6 +16,7 @@ import numpy as np
 from ahf_ros.codes.designs import relative_reach
 from ahf_ros.detectors.claims import owners
 from ahf_ros.detectors.contract import (
+    Contesting,
     Detector,
     DetectorSettings,
     Drafter,
@@ -87,6 +88,11 @@ class SeveralDetector:
     def expecting(self, ids: frozenset[int]) -> SeveralDetector:
         """Return a detector that knows which IDs are likely; see `Expecting`."""
         parts = [it.expecting(ids) if isinstance(it, Expecting) else it for it in self.parts]
+        return replace(self, parts=tuple(parts))
+
+    def contesting(self) -> SeveralDetector:
+        """Return a detector that also returns targets that share an ID; see `Contesting`."""
+        parts = [it.contesting() if isinstance(it, Contesting) else it for it in self.parts]
         return replace(self, parts=tuple(parts))
 
     def narrowed(self, families: Sequence[str]) -> Detector:

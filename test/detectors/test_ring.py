@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from ahf_ros.codes.ring import FAMILY_NAMES, family
-from ahf_ros.detectors import DetectorSettings
+from ahf_ros.detectors import DetectorSettings, create_detector
 from ahf_ros.detectors.ring.counting import estimate_count
 from ahf_ros.detectors.ring.detector import find_hypotheses, read_image
 from ahf_ros.detectors.ring.refinement import refine_centres
@@ -153,14 +153,16 @@ def test_decoded_targets_are_the_same_when_dots_are_reported():
 def test_an_id_is_reported_once_or_not_at_all():
     rendering = rendered(SMALL)
     twice = np.hstack([rendering.image, rendering.image])
-    found = identified(twice)
-    ids = [target.id for target in found if target.id != UNDECODED]
-    assert len(found) == len(identified(twice, report_undecoded=True)) == 12
+    ids = [target.id for target in identified(twice)]
     assert len(set(ids)) == len(ids)
     assert set(ids) <= {target.id for target in rendering.targets}
+    found = identified(twice, report_undecoded=True)
+    assert len(found) == 12
+    assert [target.id for target in found if target.id != UNDECODED] == ids
     contested = [target for target in found if target.id == UNDECODED]
     assert {target.reason for target in contested} == {'contested'}
     assert {target.likely_id for target in contested} <= {it.id for it in rendering.targets}
+    assert create_detector('ring').contesting()(twice) == found
 
 
 @pytest.mark.lasting

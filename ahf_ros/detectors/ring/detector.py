@@ -55,10 +55,13 @@ class RingDetector:
     settings : DetectorSettings
     expected : frozenset of int
         IDs that are likely to be there. Empty: all IDs are equally likely.
+    contested : bool
+        Whether targets whose ID others have, too, are among the results, undecoded.
     """
 
     settings: DetectorSettings = field(default_factory=DetectorSettings)
     expected: frozenset[int] = frozenset()
+    contested: bool = False
 
     @property
     def name(self) -> str:
@@ -83,7 +86,8 @@ class RingDetector:
     @one_blas_thread()
     def search(self, pyramid: ImagePyramid) -> list[Target]:
         """Identify the targets of one image; see `Searching`."""
-        return report(hypotheses_in(pyramid, self.settings, self.expected), self.settings)
+        hypotheses = hypotheses_in(pyramid, self.settings, self.expected)
+        return report(hypotheses, self.settings, self.contested)
 
     @one_blas_thread()
     def refine(self, image: np.ndarray, targets: Sequence[Target]) -> list[Target]:
@@ -94,6 +98,10 @@ class RingDetector:
     def expecting(self, ids: frozenset[int]) -> RingDetector:
         """Return a detector that knows which IDs are likely; see `Expecting`."""
         return replace(self, expected=ids)
+
+    def contesting(self) -> RingDetector:
+        """Return a detector that also returns targets that share an ID; see `Contesting`."""
+        return replace(self, contested=True)
 
 
 def find_hypotheses(
@@ -201,10 +209,12 @@ def read_pyramid(
     return replace(every, families=np.array(as_described, object))
 
 
-def report(hypotheses: Hypotheses, settings: DetectorSettings) -> list[Target]:
+def report(
+    hypotheses: Hypotheses, settings: DetectorSettings, contested: bool = False
+) -> list[Target]:
     """Return the targets to report: one for each dot, and one for each ID at the most.
 
-    Targets that claim one ID in several places are among them, undecoded.
+    Certain ones that others contradict are among them, undecoded, if `contested`.
     """
     major, _, _ = frame.ellipse_axes(hypotheses.frames)
     whole = settings.report_undecoded & (hypotheses.share >= WHOLE)
@@ -221,7 +231,7 @@ def report(hypotheses: Hypotheses, settings: DetectorSettings) -> list[Target]:
     )[1]
     kept, certain = resolve(hypotheses, keys)
     if not settings.report_undecoded:
-        kept &= hypotheses.certain
+        kept = kept & hypotheses.certain if contested else certain
     likely, ids = ids[kept], np.where(certain, ids, UNDECODED)
     some = hypotheses.select(kept)
     columns = (some.frames, some.covariance, ids[kept], codes[kept], some.confidence)
