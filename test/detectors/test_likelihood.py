@@ -184,6 +184,13 @@ def test_ground_beside_the_band_that_is_not_as_predicted_speaks_against_both() -
     assert (evidence.ink[0, 0, :8] == evidence.ink[0, 0, 20:28]).all()  # of the half inside
 
 
+def test_a_stretch_in_light_that_nothing_predicts_says_nothing() -> None:
+    light = np.where(np.arange(ANGLES) // 12 == 1, 110.0, 200.0)
+    evidence = by_levels(polar(light))
+    assert not evidence.paper[0, :, 12:24].any() and not evidence.ink[0, :, 12:24].any()
+    assert (evidence.ink > evidence.paper)[0, :, 24:].tolist() == [MARKED[24:].tolist()] * 2
+
+
 def test_a_dot_of_light_on_paper_is_no_ink() -> None:
     assert by_levels(polar(), None).dot[0] < -5
 

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import cv2
 import numpy as np
 import pytest
 
 from ahf_ros.detectors.ring.polar import PolarImages, angles_of, polar_images
+from ahf_ros.features import frame
 from ahf_ros.imaging.image import SATURATED
 from support.ring import measured
 
@@ -75,3 +77,15 @@ def test_ink_under_light() -> None:
     # Of ink that is brighter than white the camera says only that it is white.
     white = np.array([[SATURATED, 150.0]])
     assert bright.inked(paper, white).tolist() == [[SATURATED, 160.0]]
+
+
+@pytest.mark.parametrize('shift', [0.0, -0.8])
+def test_the_contrast_of_a_small_dot_is_that_of_its_ink(shift: float) -> None:
+    dot = cv2.GaussianBlur(
+        np.where(np.hypot(X - 60, Y - 60) < 5 + shift, 50.0, 200.0), (0, 0), 0.8
+    )
+    gray = dot.astype(np.float32)
+    seen = measured(gray, [60.0], [60.0], 5.0 + shift)
+    printed = frame.scaled(seen.frames, np.array([5 / (5 + shift)]))
+    of = replace(seen, frames=printed, edge_shift=np.array([shift]))
+    assert polar_images(gray, of, BAND, ANGLES).contrast[0] == pytest.approx(0.27, abs=0.03)

@@ -34,6 +34,7 @@ _PAPER_LEVEL, _INK_LEVEL = 0.05, 0.12  # of levels of paper and ink under predic
 _ANY = 0.22  # density of steps and levels of ln where anything lies
 _PLAIN = 0.35  # share of what lies about any dot that is as flat as ground
 _MARKED = 0.2  # share of what is dark that has marks, from which it is in shadow
+_FURTHER = 0.1  # price of each further reading in light that nothing predicts
 _UNLIKELY = 2.5  # standard deviations, from which a level was not predicted
 _ACROSS = (0.3, 0.75)  # shares of the gap, between which edges of light show
 _ANGLES = 120  # at which large targets have all the evidence that readings can give
@@ -362,14 +363,19 @@ def level_evidence(
     )
     ground = [paper[..., half & on_ground].sum(axis=2) for half in halves]
     beside = list(zip(halves, ground, strict=True))
-    of_halves = [
-        np.stack([of[..., half & in_band].sum(axis=2) + below for half, below in beside], axis=1)
-        for of in (paper, ink, *between)
-    ]
+    of_halves = np.stack(
+        [
+            np.stack(
+                [of[..., half & in_band].sum(axis=2) + below for half, below in beside], axis=1
+            )
+            for of in (paper, ink, *between)
+        ]
+    )
+    of_halves *= _predicted(of_halves.max(axis=0), weight[:, None])
     return Evidence(
         paper=of_halves[0],
         ink=of_halves[1],
-        between=_stacked(of_halves[2:], of_halves[1]),
+        between=np.moveaxis(of_halves[2:], 0, 2),
         sharp=_stacked([], of_halves[1]),
         weight=weight,
         dot=(ink - paper)[..., in_dot].sum(axis=(1, 2)),
@@ -377,6 +383,22 @@ def level_evidence(
         covered=np.stack([dark[..., half & on_ground].any(axis=2) for half in halves], axis=1),
         blur=_blur_along(polar, band),
     )
+
+
+def _predicted(best: np.ndarray, weight: np.ndarray) -> np.ndarray:
+    """Return where light is as predicted, bool, from the best evidence of levels, (k, 2, m) both.
+
+    Light that nothing predicts comes in stretches, each of which has its price. Where the best
+    path through it (Viterbi 1967) leads, levels say nothing of any word.
+    """
+    price = np.float32(-np.log(SURPRISES[0]))
+    gain = np.moveaxis(-best, 2, 0) - _FURTHER * weight
+    ahead, behind = np.zeros_like(gain), np.zeros_like(gain)
+    count = len(gain)
+    for step in range(1 - count, count):
+        ahead[step] = np.clip(ahead[step - 1], -price, 0) + gain[step]
+        behind[-step - 1] = np.clip(behind[-step] + gain[-step], 0, price)
+    return np.moveaxis(ahead + behind <= 0, 0, 2)
 
 
 def _surprise(errors: np.ndarray, width: np.ndarray, which: np.ndarray) -> np.ndarray:

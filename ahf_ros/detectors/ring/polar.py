@@ -9,6 +9,7 @@ import numpy as np
 from ahf_ros.features import frame
 from ahf_ros.features.array_record import ArrayRecord
 from ahf_ros.features.circle_fit import Fit
+from ahf_ros.features.normal import normal_integral
 from ahf_ros.features.profiles import USUAL_BLUR
 from ahf_ros.features.robust import NORMAL
 from ahf_ros.features.sampling import sample_circles, within
@@ -36,9 +37,9 @@ CIRCLES = 56
 
 _INNERMOST, _MARGIN = 0.3, 0.95  # first circle, and last one beyond the band, dot radii
 _PERSPECTIVE = 1.5  # of circles, more than perspective makes one side of them larger
-_SMALL = 7.0  # radius of a dot whose levels tell more than its edge, px
-_PRINTED = 0.25  # usual contrast of prints, up to which the levels of larger dots count
-_LEVELS = (0.75, 1.4)  # where the levels of dot and gap are read, dot radii
+_PRINTED = 0.25  # usual contrast of prints, up to which the levels of dots count
+_LEVELS = np.array([0.75, 1.4])  # where those of dot and gap are read, radii of the dot as seen
+_MINIMUM_SHARE = 0.3  # of ink that a level tells, between those of dot and gap
 _NARROW = 4.5  # width of a gap that blur fills, in deviations of it
 _MINIMUM_LEVEL = 1.0  # gray value that ratios are taken of
 _NOISE = (1.2, 40.0)  # smallest and largest noise, gray values
@@ -190,25 +191,34 @@ def _appearance(
     """Return contrasts of dots, and gray values that black is to be lifted to, shape (k,) each.
 
     The contrast is that of the dot's edge. Where a camera sharpens, that edge is darker than marks
-    are, and where marks are small blur makes them less dark. The levels beside the edge then tell
-    more; at large dots only up to the usual contrast of prints, because light may change between.
-    Where blur fills the gap, the ground beyond the band tells it.
+    are. The levels beside the edge, without what blur mixes there, then tell more, but only up to
+    the usual contrast of prints, because light may change between. Where blur fills the gap, the
+    ground beyond the band tells it.
     """
     angles = 2 * np.pi * np.arange(24) / 24
     inner, outer = band
-    values = sample_circles(gray, dots.frames, angles, np.array([*_LEVELS, *(outer + MARGIN)]))
+    radius = 1 + dots.polarity * dots.edge_shift / dots.size
+    beside = radius[:, None] * _LEVELS
+    ground = np.broadcast_to(outer + MARGIN, (len(radius), len(MARGIN)))
+    values = sample_circles(gray, dots.frames, angles, np.hstack([beside, ground]))
     inside, outside, *beyond = np.moveaxis(np.maximum(values, _MINIMUM_LEVEL), 2, 0)
-    ratio, bare = (
-        np.median(inside / of, axis=1) ** dots.polarity
-        for of in (outside, np.mean(beyond, axis=0))
+    deep, near = normal_integral((radius[:, None] - beside) * (dots.size / dots.blur)[:, None]).T
+    by_levels, bare = (
+        _unmixed(np.median(inside / of, axis=1), deep, share) ** dots.polarity
+        for of, share in ((outside, near), (np.mean(beyond, axis=0), 0.0))
     )
-    by_levels = np.where(dots.size < _SMALL, ratio, np.minimum(ratio, _PRINTED))
-    contrast = np.maximum(dots.contrast, by_levels)
+    contrast = np.maximum(dots.contrast, np.minimum(by_levels, _PRINTED))
     narrow = (inner - 1) * dots.size < _NARROW * np.maximum(dots.blur, USUAL_BLUR)
     contrast = np.where(narrow, np.minimum(contrast, np.maximum(bare, _PRINTED)), contrast)
     lift = black_lift(contrast, dots.bright)
     dark, bright = (lifted(of, lift) for of in (contrast * dots.bright, dots.bright))
     return np.maximum(dark, _MINIMUM_LEVEL) / np.maximum(bright, _MINIMUM_LEVEL), lift
+
+
+def _unmixed(ratio: np.ndarray, first: np.ndarray, second: np.ndarray | float) -> np.ndarray:
+    """Return ink over paper, from the ratio of levels of which blur makes shares ink, (k,)."""
+    ink = 1 + (ratio - 1) / np.maximum(first - second * ratio, _MINIMUM_SHARE)
+    return np.asarray(np.maximum(ink, 1 / SATURATED))
 
 
 def _later(gap: np.ndarray, apart: np.ndarray) -> np.ndarray:
