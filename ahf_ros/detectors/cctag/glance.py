@@ -109,14 +109,13 @@ class Glance:
             profiles = np.concatenate(
                 [circles.profiles[row[some][of]] @ resampled[up[some][of][0]] for of in parts]
             )
+            share[some] = _explained(profiles, family, size, sharp)
             soft = _DEFOCUSED * family.narrow * SIZE_STEP**size
-            edges = (*sharp, *[(0.0, soft, 0.0, 0.0)] * (soft > _EDGES[0][1]))
-            of_rings = templates(family, size, edges, _EVERY)[0]
-            rings = shares_of(profiles, of_rings, most=0).max(axis=1)
-            likely = np.flatnonzero(rings >= _PROMISING)
-            of_discs = shares_of(profiles[likely], discs(size, edges, _EVERY)).max(axis=1)
-            likely = likely[rings[likely] > of_discs]
-            share[some][likely] = rings[likely]
+            if soft > _EDGES[0][1]:
+                left = np.flatnonzero(share[some] == 0)
+                defocused = ((0.0, soft, 0.0, 0.0),)
+                explained = _explained(profiles[left], family, size, defocused)
+                share[some][left] = _PROMISING * explained  # those in focus come first
         likely = np.flatnonzero(share)
         return frame.scaled(circles.frames[row[likely]], factor[up[likely]]), share[likely]
 
@@ -127,6 +126,19 @@ class Glance:
         places = np.arange(len(self.radii))
         away = np.abs(at.clip(0, places[-1])[:, None] - places)
         return less_lines(np.maximum(1 - away, 0).T, _EVERY)
+
+
+def _explained(
+    profiles: np.ndarray, family: CircleFamily, size: int, edges: tuple[Edge, ...]
+) -> np.ndarray:
+    """Return the shares of profiles, (k, n), that rings explain and discs do not, or 0, (k,)."""
+    share = shares_of(profiles, templates(family, size, edges, _EVERY)[0], most=0).max(axis=1)
+    likely = np.flatnonzero(share >= _PROMISING)
+    of_discs = shares_of(profiles[likely], discs(size, edges, _EVERY)).max(axis=1)
+    explained = np.zeros(len(share))
+    likely = likely[share[likely] > of_discs]
+    explained[likely] = share[likely]
+    return explained
 
 
 def _runs(values: np.ndarray) -> list[slice]:
