@@ -138,7 +138,7 @@ def _run(options: argparse.Namespace, output: TextIO | None) -> int:
                     results += 1
                     found = [it for it in record['targets'] if it['id'] != UNDECODED]
                     identified += len(found)
-                    empty += [record['image']] * (not found and not record['repeated'])
+                    empty += [record['image']] * (not found and not record.get('repeated'))
                     shown.update(it['family'] for it in found)
                     if options.export:
                         measured.append(measured_image(record, record['image']))
