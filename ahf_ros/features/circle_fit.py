@@ -217,14 +217,10 @@ def _solve(edges: Edges, circles: Circles, window: np.ndarray, projective: bool)
     deviation = noise / np.maximum(edges.bright - edges.dark, _MINIMUM_STEP) / edges.scale
     model = _DisplacementModel(circles, edges.scale, projective)
 
-    usual = np.ones((len(deviation), 1))  # error of an edge, in deviations; priors are as certain
-
     def solve(weights: np.ndarray) -> tuple[tuple[np.ndarray, ...], np.ndarray]:
-        changes, normal = model.solve(displacement, weights, usual**2)
+        changes, normal = model.solve(displacement, weights)
         errors = displacement - model.displacement(changes)
-        relative = np.abs(errors) / deviation
-        usual[:] = spread(relative, own.seen, 1.0)
-        return (changes, normal, errors), relative
+        return (changes, normal, errors), np.abs(errors) / deviation
 
     weights = own.weights / deviation**2
     (changes, normal, errors), relative, robust = reweight(
@@ -277,14 +273,8 @@ class _DisplacementModel:
         self._shared, self._own, self._prior = shared, own, np.diag(prior)
         self._products = (shared[:, :, None] * shared[:, None]).reshape(len(shared), -1)
 
-    def solve(
-        self, values: np.ndarray, weights: np.ndarray, variance: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Return the unknowns, shape (k, n), and the normal matrices of weighted least squares.
-
-        The weights are those of a variance of 1; priors weigh as much more where it is `variance`,
-        shape (k, 1).
-        """
+    def solve(self, values: np.ndarray, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the unknowns, shape (k, n), and the normal matrices of weighted least squares."""
         count, known = len(values), self._shared.shape[1]
         weighted = weights[..., None] * self._own
         mixed = weighted.transpose(0, 2, 1) @ self._shared
@@ -293,7 +283,7 @@ class _DisplacementModel:
         normal[:, known:, :known] = mixed
         normal[:, :known, known:] = mixed.transpose(0, 2, 1)
         normal[:, known:, known:] = weighted.transpose(0, 2, 1) @ self._own
-        normal += self._prior * variance[..., None]
+        normal += self._prior
         right = np.concatenate(
             [(weights * values) @ self._shared, (weighted * values[..., None]).sum(axis=1)], axis=1
         )

@@ -70,7 +70,7 @@ def _against_rivals(
         word = found.select(some)
         others = [read_bands(gray, dots.select(some), code, prior) for code in rivals]
         better = [
-            (_odds(other) > _odds(word)) & (_placed(other) > _placed(word) + _MORE_SEEN)
+            (_odds(other) > _odds(word)) & (other.seen > word.seen + _MORE_SEEN)
             for other in others
         ]
         beaten = np.any(better, axis=0)
@@ -99,14 +99,6 @@ def _odds(read: Hypotheses) -> np.ndarray:
     """Return how well words of any family agree with arcs, -inf if they are not certain, (k,)."""
     choices = [len(code.words) * code.bits for code in read.families]
     return np.where(read.certain, read.coded - np.log(np.maximum(choices, 1)), -np.inf)
-
-
-def _placed(read: Hypotheses) -> np.ndarray:
-    """Return the evidence for words, as far as edges are in their place, shape (k,).
-
-    The joint fit may bring a band of other radii into its place, but not the dot as well.
-    """
-    return read.seen * read.share
 
 
 def contested(read: Hypotheses) -> Hypotheses:
