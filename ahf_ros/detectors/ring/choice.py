@@ -24,8 +24,8 @@ _CLEAR = 0.5  # bound of the mean evidence of a reading, which spots of light ha
 _SEVERAL = 3  # words that show a family where no dot is so clear
 _ROUGH = (0.0,)  # shifts of edges that are tried to find these, px
 _SAMPLE = 8  # of those that seem to have a print, which are read first
-_LIKELIEST = 16  # dots to have a print, of which none shows that it is not there
 _MORE = 3  # times as many, where these show nothing
+_LIKELIEST = 16  # dots to have a print, of which none shows that it is not there
 _NEARLY = 0.05  # mean evidence of a reading, by which a print is as good as the best one
 _PRINTS = 3  # the most likely ones, which are tried on the same dots
 
