@@ -9,8 +9,9 @@ import pytest
 
 from ahf_ros.codes.ring import family
 from ahf_ros.detectors import DetectorSettings, create_detector
+from ahf_ros.detectors.ring.contests import among_others
 from ahf_ros.detectors.ring.detector import find_hypotheses
-from ahf_ros.detectors.ring.hypotheses import Hypotheses, among_others
+from ahf_ros.detectors.ring.hypotheses import Hypotheses
 from benchmarks.disturbed import Targets
 from benchmarks.exposure import Exposure
 from benchmarks.lookalikes import LOOKALIKES

@@ -8,7 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from ahf_ros.codes.ring import family
-from ahf_ros.detectors.ring.confidence import CERTAIN, WEIGHTS, confidence, features
+from ahf_ros.detectors.ring.confidence import WEIGHTS, confidence, features
+from ahf_ros.detectors.ring.hypotheses import CERTAIN
 from ahf_ros.detectors.ring.reading import read_bands
 from ahf_ros.features.logistic import read_weights
 from support.ring import measured

@@ -11,19 +11,14 @@ and shows how far it can be trusted.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ahf_ros.codes.ring import borders, marks
+from ahf_ros.detectors.ring.hypotheses import Hypotheses
 from ahf_ros.features.logistic import logistic, read_weights
-
-if TYPE_CHECKING:
-    from ahf_ros.detectors.ring.hypotheses import Hypotheses
-
-CERTAIN = 0.75
-"""Confidence from which words are reported."""
 
 COVERED = 0.25
 """Share of sectors that covers hide at the most where they leave even ground beyond a band."""
@@ -79,6 +74,11 @@ def _spots(read: Hypotheses) -> np.ndarray:
         length = marks(words, code.bits) / code.bits * np.pi * sum(code.band)  # dot radii
         spots[which] = np.maximum(length / 2, borders(words, code.bits) / 2)
     return spots
+
+
+def rated(read: Hypotheses) -> Hypotheses:
+    """Return hypotheses with their confidence, which is 0 where there is no word."""
+    return replace(read, confidence=np.where(read.words > 0, confidence(features(read)), 0.0))
 
 
 def confidence(values: np.ndarray) -> np.ndarray:

@@ -14,9 +14,9 @@ import numpy as np
 from ahf_ros.detectors.claims import owners
 from ahf_ros.detectors.contract import DetectorSettings
 from ahf_ros.detectors.ring.confidence import features, target_probability
+from ahf_ros.detectors.ring.contests import on_targets
 from ahf_ros.detectors.ring.decoding import CLEAR
 from ahf_ros.detectors.ring.detector import find_hypotheses
-from ahf_ros.detectors.ring.hypotheses import on_targets
 from ahf_ros.features import frame
 from ahf_ros.imaging.image import as_gray, check_image
 

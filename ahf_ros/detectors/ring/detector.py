@@ -16,6 +16,7 @@ from ahf_ros.blas import one_blas_thread
 from ahf_ros.codes.ring import Family
 from ahf_ros.detectors.contract import DetectorSettings
 from ahf_ros.detectors.ring.choice import choose_families, further_families
+from ahf_ros.detectors.ring.contests import among_others, resolve
 from ahf_ros.detectors.ring.families import (
     contested,
     decoded,
@@ -23,7 +24,7 @@ from ahf_ros.detectors.ring.families import (
     settle_same_prints,
 )
 from ahf_ros.detectors.ring.full_size import at_full_size
-from ahf_ros.detectors.ring.hypotheses import Hypotheses, among_others, resolve
+from ahf_ros.detectors.ring.hypotheses import Hypotheses
 from ahf_ros.detectors.ring.known import WHOLE, Explained, Prior
 from ahf_ros.detectors.ring.learning import with_measured_bands
 from ahf_ros.detectors.ring.proposals import (

@@ -1,26 +1,21 @@
-"""Hypotheses on the dots of an image, and how contradicting ones are resolved."""
+"""Hypotheses on the dots of an image: where they are, and what their bands were read as."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from ahf_ros.codes.ring import Family
-from ahf_ros.detectors.claims import Rivals, leading, owners
-from ahf_ros.detectors.ring.confidence import CERTAIN, COVERED, confidence, features
 from ahf_ros.detectors.ring.decoding import Words
 from ahf_ros.features import frame
 from ahf_ros.features.array_record import ArrayRecord
 from ahf_ros.features.circle_fit import Fit
 
-_CLEARLY = 2.0  # times the evidence of another claim to the same ID or dot
+CERTAIN = 0.75
+"""Confidence from which words are reported."""
+
 _CLEAR = 5.0  # log odds of a word against arcs of any length, up to which others may be right
-_FOREIGN = 10.0  # log odds of arcs of any length against a word, which is none then
-_ROUND = 0.6  # share of the edges of a word that are in their place, where there is a band
-_CODED = 5.0  # odds of words against arcs of any length, before any is read
-_OVERLAP = 0.92  # of the radii of two targets, at which the paper of one hides marks of the other
-_ON_TOP = 3.0  # times as sure of its word as of what lies below it
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,8 +103,8 @@ class Hypotheses(ArrayRecord):
 
     @staticmethod
     def of(fit: Fit, words: Words, family: Family) -> Hypotheses:
-        """Return the hypotheses of words, and of the frames that were fitted to them."""
-        read = Hypotheses(
+        """Return words and the frames that were fitted to them, not rated yet."""
+        return Hypotheses(
             frames=fit.frames,
             covariance=fit.covariance,
             share=fit.share,
@@ -130,88 +125,8 @@ class Hypotheses(ArrayRecord):
             families=np.full(len(words.words), family, object),
             confidence=np.zeros(len(words.words)),
         )
-        return replace(read, confidence=np.where(read.words > 0, confidence(features(read)), 0.0))
 
     @staticmethod
     def unread(dots: Fit, family: Family) -> Hypotheses:
         """Return dots without words."""
         return Hypotheses.of(dots, Words.none(len(dots.frames)), family)
-
-
-def among_others(hypotheses: Hypotheses) -> Hypotheses:
-    """Return hypotheses of an image, less certain where it shows bands of no family that is read.
-
-    Targets of one image share a family. Whole bands that arcs of any length explain better than
-    words, with ends anywhere, and targets that do not look like their print are foreign. Among
-    these a word is one by chance, unless more targets share its family; and it is arcs of any
-    length, unless it explains its band better. What is not certain among these speaks for no other
-    word of its family.
-    """
-    arcs = (hypotheses.coded < -_FOREIGN) & (hypotheses.ends <= 0) & (hypotheses.share > _ROUND)
-    arcs |= hypotheses.unlike > COVERED
-    left = hypotheses
-    while True:
-        among = replace(hypotheses, confidence=_among(hypotheses, left, arcs & ~left.certain))
-        if np.array_equal(among.certain, left.certain):
-            return among
-        left = among
-
-
-def _among(hypotheses: Hypotheses, likely: Hypotheses, foreign: np.ndarray) -> np.ndarray:
-    """Return the confidence of hypotheses, by how likely each is and by foreign bands, (k,)."""
-    left = hypotheses.confidence.copy()
-    for code in dict.fromkeys(hypotheses.families):
-        own = hypotheses.families == code
-        sure, others = hypotheses.confidence[own], foreign[own].sum()
-        alike = (likely.certain * likely.confidence)[own]
-        alike = alike.sum() - alike + 0.5
-        by_chance = np.maximum((others + 0.5) / alike, 1)
-        as_arcs = others / alike * np.exp(-np.maximum(hypotheses.coded[own], 0)) / _CODED
-        left[own] = sure / (1 + (1 - sure) * (by_chance - 1) + sure * as_arcs)
-    return left
-
-
-def resolve(hypotheses: Hypotheses, ids: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return which hypotheses to keep, and which of these stay certain, bool, shape (k,) each.
-
-    They come in the order of their evidence, the certain ones first; `ids` are equal where words
-    are the same. The best one of a dot is kept. Dots on the band of a certain target are its
-    sectors and are dropped. Certain stays what neither another reading of its dot, nor a target
-    whose band overlaps, nor another claim to its ID comes near to.
-    """
-    seen, order = hypotheses.seen, np.arange(len(ids))
-    on_it = on_targets(hypotheses, hypotheses.certain)
-
-    def against(index: int) -> np.ndarray:
-        return on_it(index) & (ids != ids[index]) & (order > index)
-
-    kept = owners(len(ids), on_it)
-    certain = kept & leading(seen, hypotheses.certain, against, _CLEARLY)
-    sure = 1 / (1 - hypotheses.confidence + np.finfo(float).eps)
-    certain = leading(sure, certain, _overlapping(hypotheses), _ON_TOP)
-    return kept, leading(seen, certain, lambda index: ids == ids[index], _CLEARLY)
-
-
-def on_targets(hypotheses: Hypotheses, certain: np.ndarray) -> Rivals:
-    """Return what lies on the dot of a hypothesis, or on the band of a certain one."""
-    reach = np.where(certain, hypotheses.reach, frame.ellipse_axes(hypotheses.frames)[0])
-    centres = hypotheses.frames[:, :2, 2]
-    return lambda index: np.hypot(*(centres - centres[index]).T) < reach[index]
-
-
-def _overlapping(hypotheses: Hypotheses) -> Rivals:
-    """Return of which hypotheses the bands overlap.
-
-    There the paper of one target lies on that of the other. White paper on white paper may hide
-    marks without a trace, so that only the one on top is certain, which is the surer one.
-    """
-    major, _, _ = frame.ellipse_axes(hypotheses.frames)
-    outer = major * np.array([code.band_outer for code in hypotheses.families])
-    centres = np.column_stack([hypotheses.frames[:, :2, 2], np.ones(len(major))])
-
-    def overlapping(index: int) -> np.ndarray:
-        x, y, scale = np.linalg.solve(hypotheses.frames[index], centres.T)
-        distance = np.hypot(x, y) / np.abs(scale) * major[index]
-        return np.asarray(distance < _OVERLAP * (outer + outer[index]))
-
-    return overlapping

@@ -16,6 +16,7 @@ from ahf_ros.codes.ring import Family, least_marked
 from ahf_ros.detectors.ring.appearance import unlike_print
 from ahf_ros.detectors.ring.borders import with_ends
 from ahf_ros.detectors.ring.circles import reach_of, target_circles
+from ahf_ros.detectors.ring.confidence import rated
 from ahf_ros.detectors.ring.decoding import CLEAR, DOUBT, Words, decode
 from ahf_ros.detectors.ring.hypotheses import Hypotheses
 from ahf_ros.detectors.ring.known import NOTHING_KNOWN, Prior
@@ -96,7 +97,7 @@ def _read_part(gray: np.ndarray, dots: Fit, family: Family, prior: Prior) -> Hyp
     read, dots, words = read[good], fit.select(good), words.select(good)
     fit = _joint_fit(gray, dots, words, PER_SECTOR, 2, family)
     fit = _by_dot(fit, dots, growth[good], _thin(dots, growth[good], family))
-    return unread.replaced(read, Hypotheses.of(fit, words, family))
+    return unread.replaced(read, rated(Hypotheses.of(fit, words, family)))
 
 
 def best_growth(

@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 
 from ahf_ros.codes.ring import family
+from ahf_ros.detectors.ring.confidence import rated
+from ahf_ros.detectors.ring.contests import resolve
 from ahf_ros.detectors.ring.decoding import Words
-from ahf_ros.detectors.ring.hypotheses import Hypotheses, resolve
+from ahf_ros.detectors.ring.hypotheses import Hypotheses
 from support.ring import made_up
 
 CODE = family('metashape12')
@@ -100,7 +102,7 @@ def test_readings_are_taken_over_where_they_belong():
         seen=np.array([100.0]),
         hidden=np.arange(120)[None] < 12,
     )
-    found = unread.replaced(np.array([1]), Hypotheses.of(better, words, CODE))
+    found = unread.replaced(np.array([1]), rated(Hypotheses.of(better, words, CODE)))
     assert found.words.tolist() == [0, 71]
     assert found.frames[:, 0, 2].tolist() == [10.0, 20.5]
     assert found.share.tolist() == [0.8, 1.0]
