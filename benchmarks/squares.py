@@ -24,7 +24,7 @@ from scipy.optimize import least_squares
 
 from ahf_ros.codes.square import dictionary
 from ahf_ros.detectors import create_detector
-from ahf_ros.detectors.square.sides import centres
+from ahf_ros.detectors.square.frames import centres
 from ahf_ros.evaluation import score
 from ahf_ros.synthetic.scene import SceneSettings, render
 from ahf_ros.target import Target

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from ahf_ros.codes.square import words
+from ahf_ros.detectors.square.frames import SQUARE, Places, centres
 from ahf_ros.detectors.square.prints import lay_outlines, lay_prints
-from ahf_ros.detectors.square.sides import SQUARE, Sides, centres
 from support.square_markers import needs_square_markers
 
 pytestmark = needs_square_markers
@@ -37,7 +37,7 @@ def drawn(corners: np.ndarray = CORNERS, light: np.ndarray | float = 200.0) -> n
 
 
 def test_corners_of_a_small_marker():
-    found = lay_prints(drawn(), Sides.unmeasured((CORNERS + ROUGH / 2)[None]), ink()[None])
+    found = lay_prints(drawn(), Places.unmeasured((CORNERS + ROUGH / 2)[None]), ink()[None])
     assert np.abs(found.corners[0] - CORNERS).max() < 0.06
     assert np.abs(centres(found.corners) - centres(CORNERS[None])).max() < 0.03
     assert found.share[0] > 0.95
@@ -55,7 +55,7 @@ def test_what_is_no_marker_stays_as_it_is():
     noise = np.random.default_rng(1).normal(120, 30, (56, 56)).astype(np.float32)
     assert (lay_outlines(noise, CORNERS[None]) == CORNERS).all()
     for gray in (noise, np.full_like(noise, 90), 255 - drawn()):
-        found = lay_prints(gray, Sides.unmeasured(CORNERS[None]), ink()[None])
+        found = lay_prints(gray, Places.unmeasured(CORNERS[None]), ink()[None])
         assert found.share[0] == 0
         assert (found.corners[0] == CORNERS).all()
 
@@ -64,7 +64,7 @@ def test_sides_are_kept_where_light_is_uneven():
     rows, columns = np.indices((56, 56))
     light = np.where((rows + columns) % 11 < 5, 200.0, 70.0)
     place = CORNERS * 1.5
-    sides = Sides(place[None], np.ones(1), 0.01 * np.eye(2)[None], np.full(1, np.nan))
+    sides = Places(place[None], np.ones(1), 0.01 * np.eye(2)[None], np.full(1, np.nan))
     found = lay_prints(drawn(place, light), sides, ink()[None])
     assert (found.corners == sides.corners).all()
     even = lay_prints(drawn(place), sides, ink()[None])
@@ -72,8 +72,8 @@ def test_sides_are_kept_where_light_is_uneven():
 
 
 def test_markers_at_the_border_of_the_image_and_none_at_all():
-    found = lay_prints(drawn()[:, 14:], Sides.unmeasured((CORNERS - (14, 0))[None]), ink()[None])
+    found = lay_prints(drawn()[:, 14:], Places.unmeasured((CORNERS - (14, 0))[None]), ink()[None])
     assert found.share[0] == 0
-    none = Sides.unmeasured(np.zeros((0, 4, 2)))
+    none = Places.unmeasured(np.zeros((0, 4, 2)))
     assert len(lay_prints(drawn(), none, ink()[None][:0]).corners) == 0
     assert len(lay_outlines(drawn(), np.zeros((0, 4, 2)))) == 0

@@ -1,7 +1,7 @@
 """Identification of square markers, ArUco and AprilTag, of several dictionaries at once.
 
 Quadrilaterals are found in the image and in its halves, and read as markers by the evidence of
-their cells. Corners and centres are measured in the image as received, by sides and prints.
+their cells. Corners and centres are measured in the image as received, by edges and prints.
 """
 
 from __future__ import annotations
@@ -17,10 +17,11 @@ from ahf_ros.blas import one_blas_thread
 from ahf_ros.codes.square import words
 from ahf_ros.detectors.claims import Rivals, owners
 from ahf_ros.detectors.contract import FamilyDetector, moved_targets
+from ahf_ros.detectors.square.edges import fit_edges
+from ahf_ros.detectors.square.frames import Places, centres
 from ahf_ros.detectors.square.prints import lay_outlines, lay_prints
 from ahf_ros.detectors.square.quadrilaterals import find_quadrilaterals
 from ahf_ros.detectors.square.reading import MINIMUM_ODDS, read
-from ahf_ros.detectors.square.sides import USED, Sides, centres, fit_sides
 from ahf_ros.features.frame import reduced
 from ahf_ros.features.pyramid import halved
 from ahf_ros.imaging.image import as_gray, check_image
@@ -128,21 +129,16 @@ class SquareDetector(FamilyDetector):
         gray = as_gray(image).astype(np.float32, copy=False)
         refined = list(targets)
         markers = [it for it in targets if isinstance(it, SquareMarker)]
-        for cells, border in dict.fromkeys(map(_grid, markers)):
-            alike = [it for it in markers if _grid(it) == (cells, border)]
+        prints = [~np.pad(words(it.family)[it.id], it.border) for it in markers]
+        for cells in dict.fromkeys(map(len, prints)):
+            alike = [it for it, of in zip(markers, prints, strict=True) if len(of) == cells]
             corners = np.array([it.corners for it in alike])
-            fit = fit_sides(gray, _from_halves(gray, corners, cells, border), cells, border)
-            prints = [np.pad(words(it.family)[it.id], border) for it in alike]
-            fit = lay_prints(gray, fit, ~np.array(prints))
+            ink = np.array([of for of in prints if len(of) == cells])
+            fit = fit_edges(gray, _from_halves(gray, corners, ink), ink)
+            fit = lay_prints(gray, fit, ink)
             places = _places(fit.corners, fit.covariance, fit.edge_shift)
-            good = fit.share >= USED
-            refined = moved_targets(refined, alike, places, good)
+            refined = moved_targets(refined, alike, places, fit.share > 0)
         return refined
-
-
-def _grid(marker: SquareMarker) -> tuple[int, int]:
-    """Return how many cells a side of a marker has, its border included, and this border."""
-    return words(marker.family).shape[1] + 2 * marker.border, marker.border
 
 
 def _read(gray: np.ndarray, corners: np.ndarray, groups: Groups) -> tuple[np.ndarray, np.ndarray]:
@@ -174,7 +170,7 @@ def _laid(
         alike = (group == index) & (border == width)
         cells = words(groups[index][-1])[number[alike]]
         prints = ~np.pad(cells, ((0, 0), (width, width), (width, width)))
-        fit = lay_prints(gray, Sides.unmeasured(corners[own[alike]]), prints)
+        fit = lay_prints(gray, Places.unmeasured(corners[own[alike]]), prints)
         found.append(fit.corners[fit.share > 0])
     return np.concatenate(found)
 
@@ -230,7 +226,7 @@ def _one_place(corners: np.ndarray) -> Rivals:
     return near
 
 
-def _from_halves(gray: np.ndarray, corners: np.ndarray, cells: int, border: int) -> np.ndarray:
+def _from_halves(gray: np.ndarray, corners: np.ndarray, ink: np.ndarray) -> np.ndarray:
     """Return the corners, shape (k, 4, 2), of large markers as halves of the image show them.
 
     The contour of a large marker gives its corners to a part of its side, not to two pixels.
@@ -241,8 +237,8 @@ def _from_halves(gray: np.ndarray, corners: np.ndarray, cells: int, border: int)
     halves = halved(gray, levels)
     for level in range(levels, 0, -1):
         which = np.flatnonzero(sides > _LARGE * 2 ** (level - 1))
-        fit = fit_sides(halves[level], reduced(corners[which], level), cells, border)
-        good = fit.share >= USED
+        fit = fit_edges(halves[level], reduced(corners[which], level), ink[which])
+        good = fit.share > 0
         corners[which[good]] = (fit.corners[good] + 0.5) * 2**level - 0.5
     return corners
 

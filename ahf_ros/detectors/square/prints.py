@@ -24,22 +24,24 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ahf_ros.detectors.square.sides import (
+from ahf_ros.detectors.square.frames import (
+    PLACE,
     SQUARE,
-    SYSTEMATIC,
-    USED,
-    Sides,
+    Places,
+    centre_covariance,
+    changed,
+    side_lengths,
     square_frames,
 )
 from ahf_ros.features.frame import project
 from ahf_ros.features.normal import normal_integral
 from ahf_ros.features.profiles import USUAL_BLUR
-from ahf_ros.features.robust import NORMAL, geman_mcclure
+from ahf_ros.features.robust import NORMAL, geman_mcclure, geman_mcclure_gain
 from ahf_ros.features.sampling import sample, within
 
 _CELLS = 8  # of a marker whose cells are not known
 _MARGIN = 0.6  # of paper around a print that is looked at, cells
-_LARGEST_CELL = 12.0  # whose few edges are measured better along the sides, px
+_LARGEST_CELL = 12.0  # whose few edges are measured better in profiles, px
 _SAMPLES = 4  # along a cell, at most a pixel apart where it is smaller
 _OF_OUTLINE = 2  # samples along a cell of a small marker
 _ROUNDS = 10
@@ -52,40 +54,37 @@ _USUAL_RESIDUAL = 0.3  # minimum, gray values
 _AGREES = 0.25  # residual of a sample that looks like the print, in all the contrast there is
 _ENOUGH, _HOPELESS = 0.9, 0.7  # share of such samples; where it is less, light is uneven
 _RIDGE = 1e-6  # of diagonals of normal matrices, so that they can be inverted
-_PLACE, _LEVELS = 8, 7  # unknowns of a homography; of the levels of paper and ink, and of growth
-_UNKNOWNS = _PLACE + 1 + _LEVELS
+_LEVELS = 7  # unknowns of the levels of paper and ink, and of growth
+_UNKNOWNS = PLACE + 1 + _LEVELS
 _TOGETHER = 50_000  # samples at a time, which bounds the memory
 
 
-def lay_prints(gray: np.ndarray, sides: Sides, prints: np.ndarray) -> Sides:
+def lay_prints(gray: np.ndarray, markers: Places, prints: np.ndarray) -> Places:
     """Return markers as their prints lie over the image, where these are better determined.
 
     Parameters
     ----------
     gray : ndarray of float32, shape (height, width)
         Gray values from 0 to 255.
-    sides : Sides
-        The k markers as their sides show them, or with corners to about a third of a cell.
+    markers : Places
+        The k markers as their edges show them, or with corners to about a third of a cell.
     prints : ndarray of bool, shape (k, n, n)
         Their cells, borders included, True where there is ink.
     """
-    corners, share = sides.corners.copy(), sides.share.copy()
-    covariance, shift = sides.covariance.copy(), sides.edge_shift.copy()
     cells = prints.shape[1]
-    cell = _lengths(corners) / cells
+    cell = side_lengths(markers.corners).mean(axis=1) / cells
     counts = np.clip(np.ceil(cell), 1, _SAMPLES).astype(int)
-    deviation = np.where(share >= USED, np.trace(covariance, axis1=1, axis2=2), np.inf)
+    of_edges = np.trace(markers.covariance, axis1=1, axis2=2)
+    deviation = np.where(markers.share > 0, of_edges, np.inf)
     for count in np.unique(counts).tolist():
         alike = np.flatnonzero((counts == count) & (cell <= _LARGEST_CELL))
         places = _places(cells, count)
         for which in _parts(alike, places):
-            found = _laid(gray, corners[which], prints[which], places, cells)
+            found = _laid(gray, markers.corners[which], prints[which], places, cells)
             own = np.trace(found.covariance, axis1=1, axis2=2)
             better = (found.share >= _ENOUGH) & (own < deviation[which])
-            which = which[better]
-            corners[which], share[which] = found.corners[better], found.share[better]
-            covariance[which], shift[which] = found.covariance[better], found.edge_shift[better]
-    return Sides(corners=corners, share=share, covariance=covariance, edge_shift=shift)
+            markers = markers.replaced(which[better], found[better])
+    return markers
 
 
 def _blurred(prints: np.ndarray, places: np.ndarray, blur: np.ndarray) -> np.ndarray:
@@ -134,15 +133,9 @@ def _places(cells: int, count: int) -> np.ndarray:
     return np.linspace(-reach, reach, int(np.ceil((cells + 2 * _MARGIN) * count)) + 1)
 
 
-def _lengths(corners: np.ndarray) -> np.ndarray:
-    """Return the mean lengths of sides, shape (k,)."""
-    lengths: np.ndarray = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2)
-    return lengths.mean(axis=1)
-
-
 def _laid(
     gray: np.ndarray, corners: np.ndarray, prints: np.ndarray, places: np.ndarray, cells: int
-) -> Sides:
+) -> Places:
     """Return prints laid over the image from corners on, sampled at places along either side.
 
     Of a print of one cell only what is inside its outline is known, by half of a marker's cell;
@@ -154,7 +147,7 @@ def _laid(
     grid = grid[known]
     plane = np.stack([np.ones(len(grid)), *grid.T])
     order, first = _by_cells(grid, cells)
-    frames, size = square_frames(corners), _lengths(corners)
+    frames, size = square_frames(corners), side_lengths(corners).mean(axis=1)
     blur, levels = USUAL_BLUR / size, np.zeros((len(frames), _LEVELS))
     laid, share = corners.copy(), np.zeros(len(frames))
     normals = np.tile(np.eye(_UNKNOWNS), (len(frames), 1, 1))
@@ -171,24 +164,25 @@ def _laid(
         residual = values - (levels[active, None] @ linear)[:, 0]
         step = levels[active, 3:6] @ plane
         usual = np.maximum(NORMAL * np.median(np.abs(residual), axis=1), _USUAL_RESIDUAL)
-        weights = geman_mcclure(inside, residual / (_OUTLIER * usual[:, None]))
+        relative = residual / (_OUTLIER * usual[:, None])
+        weights = geman_mcclure(inside, relative)
         full = np.concatenate([_of_place(ink, plane, step), -linear], axis=1)
         normal, scores = _normal_equations(full, weights, residual)
         change = -_solved(normal, scores)
         limit = _LARGEST_STEP / cells
-        moved = np.tile(np.eye(3), (len(active), 1, 1))
-        moved.reshape(-1, 9)[:, :_PLACE] += np.clip(change[:, :_PLACE], -limit, limit)
-        frames[active] = frames[active] @ moved
-        softer = blur[active] + change[:, _PLACE]
+        frames[active] = changed(frames[active], np.clip(change[:, :PLACE], -limit, limit))
+        softer = blur[active] + change[:, PLACE]
         blur[active] = np.clip(softer, _SHARPEST / size[active], _SOFTEST / cells)
-        levels[active] += change[:, _PLACE + 1 :]
+        levels[active] += change[:, PLACE + 1 :]
         there = project(frames[active], SQUARE)
         last = np.linalg.norm(there - laid[active], axis=2).max(axis=1)
         laid[active] = there
         alike = (np.abs(residual) < _AGREES * np.ptp(values, axis=1)[:, None]).mean(axis=1)
         settled = (last < _SETTLED) & inside.all(axis=1) & (step.max(axis=1) < 0)
         which = active[settled]
-        share[which], normals[which] = alike[settled], normal[settled]
+        gain = geman_mcclure_gain(inside[settled], relative[settled])
+        share[which] = alike[settled]
+        normals[which], _ = _normal_equations(full[settled], gain, residual[settled])
         sums[which] = np.add.reduceat(scores[settled][..., order], first, axis=2)
         hopeful = (alike > _HOPELESS) | (number == 0)
         active = active[~settled & hopeful]
@@ -196,7 +190,9 @@ def _laid(
             break
     near = np.linalg.norm(laid - corners, axis=2).max(axis=1) < np.maximum(size / cells, _NEAR)
     shift = levels[:, 6] / levels[:, 3] * size
-    return Sides(laid, np.where(near, share, 0.0), _covariance(frames, normals, sums), shift)
+    return Places(
+        laid, np.where(near, share, 0.0), centre_covariance(frames, normals, sums), shift
+    )
 
 
 def _of_levels(ink: np.ndarray, plane: np.ndarray, whole: bool) -> np.ndarray:
@@ -240,16 +236,3 @@ def _by_cells(grid: np.ndarray, cells: int) -> tuple[np.ndarray, np.ndarray]:
     cell = row * (cells + 2) + column
     order = np.argsort(cell, kind='stable')
     return order, np.flatnonzero(np.diff(cell[order], prepend=-1))
-
-
-def _covariance(frames: np.ndarray, normals: np.ndarray, sums: np.ndarray) -> np.ndarray:
-    """Return the covariances of centres, px^2, from what the samples of each cell sum up to."""
-    inverse = np.linalg.inv(normals)
-    count = sums.shape[2]
-    freedom = (count / (count - _UNKNOWNS)) ** 2
-    of_all = inverse @ (sums @ np.swapaxes(sums, 1, 2)) @ inverse
-    centre = of_all[:, [[2, 2], [5, 5]], [[2, 5], [2, 5]]]
-    scale = frames[:, 2, 2, None, None]
-    along = frames[:, :2, :2] / scale
-    along = along - frames[:, :2, 2:] / scale * frames[:, 2:, :2] / scale
-    return freedom * along @ centre @ np.swapaxes(along, 1, 2) + SYSTEMATIC**2 * np.eye(2)

@@ -18,7 +18,7 @@ import cv2
 import numpy as np
 
 from ahf_ros.codes.square import borders, words
-from ahf_ros.detectors.square.sides import square_frames
+from ahf_ros.detectors.square.frames import square_frames
 from ahf_ros.features.frame import project
 from ahf_ros.features.sampling import sample
 from ahf_ros.imaging.logarithm import LOG_OFFSET
