@@ -42,7 +42,8 @@ _INNER = 0.15  # radius, of the outermost, of any other circle
 _NARROWEST = 0.5  # ring that is read, px; blur hides others
 _PROMISING = 0.6  # share of a profile that rings explain, from which they are looked at
 _LOOKED_AT = 2  # frames for an ID, at the most
-_APART = 0.2  # distance of the centres of different frames, radii
+_APART = 0.1  # distance of the centres of different frames, radii
+_LEAST_UNLIKE = 1e-6  # of squares of gray values, of their mean
 _PART = 128  # circles that are read at a time
 
 
@@ -53,7 +54,7 @@ class Circles(ArrayRecord):
     frames: np.ndarray  # (k, 3, 3)
     polarity: np.ndarray  # int, (k,), 0 if it is unknown
     step: np.ndarray  # int, (k,), of radii
-    profiles: np.ndarray  # float32, (k, n), gray values of rays, each in its own light
+    profiles: np.ndarray  # float32, (k, n), of rays in their own light, most of like ones
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,14 +83,16 @@ class Glance:
             part = slice(start, start + _PART)
             seen = sample_circles(gray, dots.frames[part], ANGLES[::_EVERY], radii)
             np.maximum(seen, 0, out=seen)
-            light = np.maximum(seen[..., :own] @ share / share.sum(), 1)
-            profiles[part] = ((1 / light)[:, None] @ seen)[:, 0]
+            seen /= np.maximum(seen[..., :own] @ share / share.sum(), 1)[..., None]
+            unlike = (seen[..., :own] - seen[..., :own].mean(axis=1, keepdims=True)) ** 2 @ share
+            weight = 1 / (unlike + np.median(unlike, axis=1, keepdims=True) + _LEAST_UNLIKE)
+            profiles[part] = (weight[:, None] @ seen)[:, 0]
         return Glance(Circles(dots.frames, dots.polarity, step[order], profiles), steps, radii)
 
     def likely(
         self, radii: tuple[float, float], polarity: int, family: CircleFamily
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Return likely frames of outermost circles, and shares that rings explain."""
+        """Return likely frames of outermost circles, and how much likelier they are than discs."""
         circles, ups = self.circles, np.array(self.steps)
         sign = np.where(ups < _OUTERMOST.stop, polarity, -polarity)
         factor = SIZE_STEP**ups
@@ -103,21 +106,22 @@ class Glance:
         row, up, step = row[order], up[order], step[order]
         sharp = tuple((polarity * of[0], *of[1:3], polarity * of[3]) for of in _EDGES)
         resampled = [polarity * self._resampled(by) for by in self.steps]
-        share = np.zeros(len(row))
+        better = np.zeros(len(row))
         for some in _runs(step):
             size, parts = int(step[some][0]), _runs(up[some])
             profiles = np.concatenate(
                 [circles.profiles[row[some][of]] @ resampled[up[some][of][0]] for of in parts]
             )
-            share[some] = _explained(profiles, family, size, sharp)
+            better[some] = _better(profiles, family, size, sharp)
             soft = _DEFOCUSED * family.narrow * SIZE_STEP**size
             if soft > _EDGES[0][1]:
-                left = np.flatnonzero(share[some] == 0)
+                left = np.flatnonzero(better[some] == 0)
                 defocused = ((0.0, soft, 0.0, 0.0),)
-                explained = _explained(profiles[left], family, size, defocused)
-                share[some][left] = _PROMISING * explained  # those in focus come first
-        likely = np.flatnonzero(share)
-        return frame.scaled(circles.frames[row[likely]], factor[up[likely]]), share[likely]
+                # Those in focus come first.
+                better[some][left] = 0.5 * _better(profiles[left], family, size, defocused)
+        likely = np.flatnonzero(better)
+        frames = frame.scaled(circles.frames[row[likely]], factor[up[likely]])
+        return frames, better[likely] * frame.mean_radii(frames)
 
     def _resampled(self, by: int) -> np.ndarray:
         """Return what makes weighted profiles of circles so many steps larger, (n, m)."""
@@ -128,17 +132,19 @@ class Glance:
         return less_lines(np.maximum(1 - away, 0).T, _EVERY)
 
 
-def _explained(
+def _better(
     profiles: np.ndarray, family: CircleFamily, size: int, edges: tuple[Edge, ...]
 ) -> np.ndarray:
-    """Return the shares of profiles, (k, n), that rings explain and discs do not, or 0, (k,)."""
+    """Return by how much less of profiles, (k, n), rings leave than discs, ln, (k,).
+
+    It is 0 of what is not like rings.
+    """
     share = shares_of(profiles, templates(family, size, edges, _EVERY)[0], most=0).max(axis=1)
     likely = np.flatnonzero(share >= _PROMISING)
     of_discs = shares_of(profiles[likely], discs(size, edges, _EVERY)).max(axis=1)
-    explained = np.zeros(len(share))
-    likely = likely[share[likely] > of_discs]
-    explained[likely] = share[likely]
-    return explained
+    better = np.zeros(len(share))
+    better[likely] = np.maximum(np.log1p(-of_discs) - np.log1p(-share[likely]), 0)
+    return better
 
 
 def _runs(values: np.ndarray) -> list[slice]:
@@ -153,13 +159,13 @@ def likely_rings(
     """Return the frames of outermost circles whose mean profile looks like rings, (k, 3, 3).
 
     The bounds are those of the semi-major axis. An ID is there once, so that some times as many
-    frames are enough, those most like rings.
+    frames are enough, those that are most like rings and least like discs.
     """
     found = [of.likely(radii, polarity, family) for of in glances]
-    frames, share = (np.concatenate(of) for of in zip(*found, strict=True))
+    frames, better = (np.concatenate(of) for of in zip(*found, strict=True))
     size, centres = frame.mean_radii(frames), frames[:, :2, 2]
     kept: list[int] = []
-    for index in np.argsort(size * np.log1p(-share), kind='stable').tolist():
+    for index in np.argsort(-better, kind='stable').tolist():
         if len(kept) == _LOOKED_AT * len(family.numbers):
             break
         away = np.hypot(*(centres[kept] - centres[index]).T)
