@@ -157,7 +157,7 @@ def _identified(
     sure = (possible.confidence >= _SURE) & (again.of_target >= _SURE)
     told = replace(again, margin=possible.margin).select(sure)
     again = identify(light, frames[_alone(frames, told.frames)], polarity, family, camera)
-    known, rings = camera, _best(Aligned.joined([rings, told, again]), camera)
+    known, rings = camera, _best(_renewed(rings, Aligned.joined([told, again])), camera)
     for _ in range(_ROUNDS):
         sure = rings.of_target >= _SURE_OF_TARGET
         prior = Prior.after(rings.select(sure & (rings.confidence >= _PROBABLE)))
@@ -169,7 +169,7 @@ def _identified(
         doubtful = np.concatenate([rings.frames, frames])
         doubtful = doubtful[_alone(doubtful, certain.frames)]
         again = _readings(light, doubtful, polarity, family, prior)
-        rings = _best(Aligned.joined([rings, again]), prior)
+        rings = _best(_renewed(rings, again), prior)
     return rings, light
 
 
@@ -180,6 +180,11 @@ def _readings(
     return Aligned.joined(
         [identify(gray, frames, polarity, family, prior, most) for most in range(1, EDGES + 1)]
     )
+
+
+def _renewed(rings: Aligned, again: Aligned) -> Aligned:
+    """Return readings; what is read again is read with more knowledge than before."""
+    return Aligned.joined([rings.select(_alone(rings.frames, again.frames)), again])
 
 
 def _best(rings: Aligned, prior: Prior) -> Aligned:
