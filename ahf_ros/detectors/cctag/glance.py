@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 
@@ -19,6 +18,7 @@ from ahf_ros.detectors.cctag.templates import (
     CLIPPED,
     SIZE_STEP,
     Edge,
+    by_value,
     discs,
     less_lines,
     shares_of,
@@ -41,6 +41,7 @@ _OUTERMOST = range(-3, 2)  # steps of the radius to that of the outermost circle
 _INNER = 0.15  # radius, of the outermost, of any other circle
 _NARROWEST = 0.5  # ring that is read, px; blur hides others
 _PROMISING = 0.6  # share of a profile that rings explain, from which they are looked at
+_OF_DISCS = 0.9  # of 1, so that of rings in one place those that leave least are looked at
 _LOOKED_AT = 2  # frames for an ID, at the most
 _APART = 0.1  # distance of the centres of different frames, radii
 _LEAST_UNLIKE = 1e-6  # of squares of gray values, of their mean
@@ -101,24 +102,20 @@ class Glance:
         tried = (major >= radii[0]) & (major <= radii[1]) & (narrow >= _NARROWEST)
         tried &= circles.polarity[:, None] * sign >= 0
         row, up = np.nonzero(tried)
-        step = circles.step[row] + ups[up]
-        order = np.lexsort((up, step))
-        row, up, step = row[order], up[order], step[order]
         sharp = tuple((polarity * of[0], *of[1:3], polarity * of[3]) for of in _EDGES)
         resampled = [polarity * self._resampled(by) for by in self.steps]
         better = np.zeros(len(row))
-        for some in _runs(step):
-            size, parts = int(step[some][0]), _runs(up[some])
-            profiles = np.concatenate(
-                [circles.profiles[row[some][of]] @ resampled[up[some][of][0]] for of in parts]
-            )
+        for size, some in by_value(circles.step[row] + ups[up]):
+            profiles = np.empty((len(some), len(PROFILE[::_EVERY])), np.float32)
+            for by, of in by_value(up[some]):
+                profiles[of] = circles.profiles[row[some[of]]] @ resampled[by]
             better[some] = _better(profiles, family, size, sharp)
             soft = _DEFOCUSED * family.narrow * SIZE_STEP**size
             if soft > _EDGES[0][1]:
                 left = np.flatnonzero(better[some] == 0)
                 defocused = ((0.0, soft, 0.0, 0.0),)
                 # Those in focus come first.
-                better[some][left] = 0.5 * _better(profiles[left], family, size, defocused)
+                better[some[left]] = 0.5 * _better(profiles[left], family, size, defocused)
         likely = np.flatnonzero(better)
         frames = frame.scaled(circles.frames[row[likely]], factor[up[likely]])
         return frames, better[likely] * frame.mean_radii(frames)
@@ -143,14 +140,9 @@ def _better(
     likely = np.flatnonzero(share >= _PROMISING)
     of_discs = shares_of(profiles[likely], discs(size, edges, _EVERY)).max(axis=1)
     better = np.zeros(len(share))
-    better[likely] = np.maximum(np.log1p(-of_discs) - np.log1p(-share[likely]), 0)
+    less = _OF_DISCS * np.log1p(-of_discs) - np.log1p(-share[likely])
+    better[likely] = np.where(share[likely] > of_discs, less, 0)
     return better
-
-
-def _runs(values: np.ndarray) -> list[slice]:
-    """Return where values, (n,), are the same one after the other."""
-    ends = [*(np.flatnonzero(np.diff(values)) + 1).tolist(), len(values)]
-    return [slice(start, end) for start, end in pairwise([0, *ends]) if start < end]
 
 
 def likely_rings(

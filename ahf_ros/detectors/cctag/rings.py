@@ -28,6 +28,7 @@ from ahf_ros.detectors.cctag.templates import (
     MASK,
     MAXIMUM_SHIFT,
     Edge,
+    by_value,
     less_lines,
     rings_along,
     shares_of,
@@ -207,12 +208,6 @@ NOTHING = Aligned(
 )
 
 
-def _by_size(frames: np.ndarray) -> list[tuple[int, np.ndarray]]:
-    """Return steps of the radius, and the indices of the frames that have it."""
-    steps = size_steps(frame.mean_radii(frames))
-    return [(step, np.flatnonzero(steps == step)) for step in np.unique(steps).tolist()]
-
-
 def identify(
     gray: np.ndarray,
     frames: np.ndarray,
@@ -317,7 +312,7 @@ def _likely_ids(
     for of_scale, profile, share, edge in zip(scaled, profiles, shares, edges, strict=True):
         seen = lit(gray, of_scale, lights)
         profile[:] = less_lines(polarity * seen.values.mean(axis=1, dtype=np.float64))
-        for step, of_size in _by_size(of_scale):
+        for step, of_size in by_value(size_steps(frame.mean_radii(of_scale))):
             for clipped in (0, 1):
                 some = of_size[seen.clipped[of_size] == clipped]
                 if not len(some):
@@ -342,7 +337,7 @@ def _likely_ids(
 def _unlike_discs(profiles: np.ndarray, shares: np.ndarray, frames: np.ndarray) -> np.ndarray:
     """Return whether rings explain shares of profiles, (k,), that two discs do not explain."""
     of_two = np.empty(len(shares))
-    for step, of_size in _by_size(frames):
+    for step, of_size in by_value(size_steps(frame.mean_radii(frames))):
         of_two[of_size] = two_discs(profiles[of_size], step)
     left_by_two, left = (np.maximum(1 - of, 1e-6) for of in (of_two, shares))
     better = np.log(left_by_two / left) >= -_LIKE_DISCS / frame.mean_radii(frames)

@@ -36,6 +36,11 @@ def size_steps(size: np.ndarray) -> np.ndarray:
     return steps
 
 
+def by_value(values: np.ndarray) -> list[tuple[int, np.ndarray]]:
+    """Return the values of some integers, each with the indices where it is."""
+    return [(value, np.flatnonzero(values == value)) for value in np.unique(values).tolist()]
+
+
 def less_lines(profiles: np.ndarray, every: int = 1) -> np.ndarray:
     """Return weighted profiles less straight lines, float32, shape (k, n)."""
     weight, line = _weights(every)
