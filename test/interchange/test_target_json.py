@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from ahf_ros import SceneSettings, identify
-from ahf_ros.detectors.ring.confidence import CERTAIN
+from ahf_ros.detectors.ring.hypotheses import CERTAIN
 from ahf_ros.interchange.target_json import read_results, targets_from_json, to_json
 from ahf_ros.target import (
     DottedTarget,
