@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import atexit
+import os
 import sys
+import threading
 from functools import partial
 from pkgutil import resolve_name
 
@@ -24,13 +27,19 @@ INSTALL = (
 )
 
 
+_exit = os._exit  # before what a detector calls is refused
+_status: int | None = None
+
+
 def start(node: str, arguments: list[str] | None = None) -> int:
     """Run one of `NODES` and return its exit status.
 
     Where there are no arguments, `sys.argv` has them. `--help` before those that ROS reads prints
     what the node does.
     """
+    global _status
     signalled()
+    atexit.register(_leave_threads)  # before all others, so that it is called last
     own = sys.argv[1:] if arguments is None else arguments
     if '--ros-args' in own:
         own = own[: own.index('--ros-args')]
@@ -52,7 +61,19 @@ def start(node: str, arguments: list[str] | None = None) -> int:
     if has_arrived():
         ignore_ending()
         return 0
-    return run(node_class, arguments)
+    _status = run(node_class, arguments)
+    return _status
+
+
+def _leave_threads() -> None:
+    """End with the status of the node where threads go on, by a second look or in a detector.
+
+    As Python ends, it ends those in the middle of a call, which aborts the process if this is C++.
+    """
+    if _status is not None and any(it.daemon for it in threading.enumerate()):
+        sys.stdout.flush()
+        sys.stderr.flush()
+        _exit(_status)
 
 
 detector, illumination, pose, registration, scoreboard = (partial(start, node) for node in NODES)

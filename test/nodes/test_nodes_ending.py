@@ -39,6 +39,21 @@ sys.exit(start({node!r}))
 """
 
 
+GOING_ON = """
+import sys, threading
+import cv2, numpy as np
+from ahf_ros.nodes.start import start
+
+def go_on():
+    while True:
+        cv2.GaussianBlur(np.zeros((200, 200), np.uint8), (0, 0), 1.0)
+
+for _ in range(4):
+    threading.Thread(target=go_on, daemon=True).start()
+sys.exit(start('detector', ['--ros-args', '-p', 'expected_targets:=-1']))
+"""
+
+
 def run(*command: str, **environment: str) -> tuple[int, str]:
     """Return exit status and error output of a process."""
     done = subprocess.run(
@@ -80,6 +95,12 @@ def test_what_ros_does_not_accept_is_told_in_a_line(arguments: list[str], reason
     status, errors = run('-m', 'ahf_ros.nodes', 'detector', '--ros-args', *arguments)
     assert (status, len(errors.splitlines())) == (1, 1), errors
     assert reason in errors
+
+
+def test_threads_that_go_on_in_the_middle_of_a_call_do_not_change_the_status() -> None:
+    status, errors = run('-c', GOING_ON)
+    assert (status, len(errors.splitlines())) == (1, 1), errors
+    assert 'expected_targets' in errors
 
 
 def test_a_node_that_has_to_be_secure_and_cannot_be_does_not_run(tmp_path: Path) -> None:
