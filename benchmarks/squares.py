@@ -63,7 +63,14 @@ def readers() -> dict[str, Reader]:
         from pupil_apriltags import Detector
     except ImportError:
         return found
-    pupil = Detector(families='tag36h11', quad_decimate=1.0)
+
+    class Kept(Detector):
+        """Never released, as that reads what it has freed (pupil-labs/apriltags, pull 65)."""
+
+        def __del__(self) -> None:
+            pass
+
+    pupil = Kept(families='tag36h11', quad_decimate=1.0)
 
     def by_pupil(image: np.ndarray) -> list[Target]:
         tags = pupil.detect(image)
