@@ -83,7 +83,7 @@ def fit_edges(gray: np.ndarray, corners: np.ndarray, prints: np.ndarray) -> Plac
                 break
             found = _fitted(gray, corners[which], prints[which], inside_first)
             better = found.share > places.share[which]
-            places = places.replaced(which[better], found[better])
+            places = places.replaced(which[better], found.select(better))
             which = which[places.share[which] < _DOUBTFUL]
     refused = places.share < _ENOUGH
     return places.replaced(refused, Places.unmeasured(corners[refused]))

@@ -14,6 +14,8 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
+from ahf_ros.features.array_record import ArrayRecord
+
 SQUARE = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])
 """Corners of the square about the origin with sides of 1."""
 
@@ -25,7 +27,7 @@ PLACE = 8
 
 
 @dataclass(frozen=True, slots=True)
-class Places:
+class Places(ArrayRecord):
     """Where square markers are.
 
     Attributes
@@ -51,19 +53,6 @@ class Places:
         """Return markers of which only corners are known."""
         count = len(corners)
         return cls(corners, np.zeros(count), np.zeros((count, 2, 2)), np.full(count, np.nan))
-
-    def replaced(self, which: np.ndarray, others: Places) -> Places:
-        """Return these with the others where `which`, indices or bool of shape (k,), says so."""
-        fields = []
-        for name in self.__slots__:
-            values = getattr(self, name).copy()
-            values[which] = getattr(others, name)
-            fields.append(values)
-        return Places(*fields)
-
-    def __getitem__(self, which: np.ndarray) -> Places:
-        """Return some of these."""
-        return Places(*(getattr(self, name)[which] for name in self.__slots__))
 
 
 def centres(corners: np.ndarray) -> np.ndarray:

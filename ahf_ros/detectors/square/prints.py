@@ -83,7 +83,7 @@ def lay_prints(gray: np.ndarray, markers: Places, prints: np.ndarray) -> Places:
             found = _laid(gray, markers.corners[which], prints[which], places, cells)
             own = np.trace(found.covariance, axis1=1, axis2=2)
             better = (found.share >= _ENOUGH) & (own < deviation[which])
-            markers = markers.replaced(which[better], found[better])
+            markers = markers.replaced(which[better], found.select(better))
     return markers
 
 
