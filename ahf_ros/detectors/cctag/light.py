@@ -79,7 +79,7 @@ class Lights(ArrayRecord):
         for number in range(self.edges.shape[1]):
             some = np.flatnonzero(heights[:, 2 + number])
             edge = self.edges[some, number : number + 1]
-            step = _steps(edge, x[some], y[some], _widths(size[some]))[:, 0]
+            step = _steps(edge, x[some], y[some], usual_widths(size[some]))[:, 0]
             light[some] += heights[some, 2 + number] * step
         slope = np.empty((len(light), len(radii)))
         for own, known in zip(slope, self.slope, strict=True):
@@ -204,7 +204,7 @@ class _Scene(ArrayRecord):
         usual = np.tile(np.array(_DEVIATIONS) ** -2.0, count)
         for _ in range(_ROUNDS):
             away, across, along = _away(fit.edges, _X, _Y)
-            width = _own_widths(fit.edges, _widths(self.size))
+            width = _own_widths(fit.edges, usual_widths(self.size))
             step, by_share = _logarithms(normal_integral(away / width), fit.edges)
             density = np.exp(-0.5 * (away / width) ** 2) / width / math.sqrt(2 * math.pi)
             density *= by_share * fit.heights[:, _OTHERS:, None, None].astype(np.float32)
@@ -231,7 +231,7 @@ class _Scene(ArrayRecord):
         return fit
 
     def _steps(self, edges: np.ndarray) -> np.ndarray:
-        return _steps(edges, _X, _Y, _widths(self.size))
+        return _steps(edges, _X, _Y, usual_widths(self.size))
 
     def _basis(self, of_edges: np.ndarray) -> np.ndarray:
         """Return slopes, moves and what is of edges (k, b, m, n), less means of circles."""
@@ -282,7 +282,7 @@ def _first_edges(size: int) -> tuple[np.ndarray, np.ndarray]:
     curved = product(2 * np.pi * np.arange(_CURVED) / _CURVED, _OFFSETS, [_CURVATURE])
     edges = np.pad(np.array([*straight, *curved]), ((0, 0), (0, 2)))
     x, y, weight = _X[_FEW], _Y[_FEW], np.sqrt(_RADII[_FEW])
-    steps = _steps(edges[None], x, y, _widths(np.array([_SIZES**size])))[0]
+    steps = _steps(edges[None], x, y, usual_widths(np.array([_SIZES**size])))[0]
     steps = _less_means(steps, np.broadcast_to(weight**2, x.shape), _PAPER // 2) * weight
     steps = steps.reshape(len(edges), -1)
     plane, _ = np.linalg.qr((np.stack([x, y]) * weight).reshape(2, -1).T)
@@ -329,7 +329,7 @@ def _own_widths(edges: np.ndarray, width: np.ndarray) -> np.ndarray:
     return own
 
 
-def _widths(size: np.ndarray) -> np.ndarray:
+def usual_widths(size: np.ndarray) -> np.ndarray:
     """Return the usual widths of edges, in radii, about targets of so many px."""
     widths: np.ndarray = np.maximum(_WIDTH / size, _SHARPEST).astype(np.float32)
     return widths

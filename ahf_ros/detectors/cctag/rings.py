@@ -42,12 +42,13 @@ from ahf_ros.features.logistic import logistic
 from ahf_ros.features.normal import normal_integral
 from ahf_ros.features.robust import NORMAL
 
+GAMMA = 2.2
+"""Of gray values, unless they are light."""
 _TRIED_SHIFTS = -1.2, -0.6, 0.0, 0.6, 1.2  # deviations
 _TRIED_BLURS, _TRIED_SHARPENINGS = (-1.0, 0.0, 1.4), (3.0, 7.0)  # the same
 _GROWN = (0.85, 0.9, 0.95, 1.0, 1.05)  # radii of the outermost circle, where that was found
 _PART = 2048, 48  # hypotheses and targets at a time, which bounds the memory
 _SHARED = 0.55  # share of what rays show, that is the same on all, from which they are read
-_GAMMA = 2.2  # of gray values, unless they are light
 _CLEARLY = 0.03  # `left` by which rings must be better explained
 _TELLING_OF_GAMMA = 16  # targets
 _ENOUGH = 4  # certain targets, that tell of the edges of an image
@@ -352,13 +353,19 @@ def _shared(seen: Seen) -> np.ndarray:
     return shared
 
 
+def as_light(gray: np.ndarray) -> np.ndarray:
+    """Return the light, up to 255, of gray values that have the usual gamma."""
+    light: np.ndarray = 255 * (gray.clip(0) / 255) ** np.float32(GAMMA)
+    return light
+
+
 def in_light(gray: np.ndarray, rings: Aligned, family: CircleFamily) -> np.ndarray:
     """Return an image of light, where rings show clearly that its gray values have a gamma.
 
     Blur mixes light, and not gray values, which matters where rings are narrow.
     """
     some = rings.select(np.argsort(-rings.plain, kind='stable')[:_TELLING_OF_GAMMA])
-    light: np.ndarray = 255 * (gray.clip(0) / 255) ** np.float32(_GAMMA)
+    light = as_light(gray)
     again = _settled(light, some, family, _USUAL, Lights.about(light, some.frames))
     telling = np.maximum(some.of_target, again.of_target)
     return light if telling @ (again.left - some.left + _CLEARLY) < 0 else gray
@@ -418,7 +425,7 @@ def _aligned(
         )  # pixels are independent
         normal, right = normal * each[:, None, None], right * each[:, None]
         normal[:, range(5), range(5)] += 1e-6
-        usual = _usual_perspective(frames)
+        usual = usual_perspective(frames)
         normal[:, 5:7, 5:7] += usual
         right[:, 5:7] -= (usual @ frames[:, 2, :2, None])[..., 0]
         known = np.array(prior.deviations) ** -2
@@ -497,7 +504,7 @@ def _hiding(
     return hidden
 
 
-def _usual_perspective(frames: np.ndarray) -> np.ndarray:
+def usual_perspective(frames: np.ndarray) -> np.ndarray:
     """Return the inverse covariances of the perspective of frames, (k, 2, 2), that is expected.
 
     Scale changes along the minor axis of a tilted target, the more the more it is foreshortened.

@@ -81,9 +81,9 @@ def templates(
     family: CircleFamily, step: int, edges: tuple[Edge, ...], every: int = 1
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the ink of all IDs with some edges, shape (t, n), and these edges, (e, 3)."""
-    size, table = SIZE_STEP**step, family.radii(family.numbers)
+    size, table = SIZE_STEP**step, signed_circles(family, family.numbers)
     # IDs share circles, so that there are few to compute.
-    signed, inverse = np.unique((table * _signs(table)).round(6), return_inverse=True)
+    signed, inverse = np.unique(table.round(6), return_inverse=True)
     most = MAXIMUM_SHIFT * family.narrow * size
     tried = dict.fromkeys((float(np.clip(of[0], -most, most)), *of[1:]) for of in edges)
     inks = []
@@ -134,8 +134,13 @@ def rings_along(
     These are by the radius, in radii of the target, by the shift, px, by ln of the blur and by the
     sharpening.
     """
+    return _circles(signed_circles(family, ids), size, shift, blur, sharpening)
+
+
+def signed_circles(family: CircleFamily, ids: np.ndarray) -> np.ndarray:
+    """Return the radii of the circles of IDs (k,), below 0 where paper fills them, (k, c)."""
     radii = family.radii(ids)
-    return _circles(_signs(radii) * radii, size, shift, blur, sharpening)
+    return _signs(radii) * radii
 
 
 def _circles(
