@@ -28,6 +28,7 @@ from ahf_ros.detectors.cctag.patch import (
     Formed,
     Patch,
 )
+from ahf_ros.detectors.cctag.rays import clipped
 from ahf_ros.detectors.cctag.rings import GAMMA, Aligned, Prior, align, as_light, usual_perspective
 from ahf_ros.detectors.cctag.templates import MAXIMUM_SHIFT, signed_circles
 from ahf_ros.features import frame
@@ -43,7 +44,7 @@ _VALUES = _PRIOR.shift, math.log(_PRIOR.blur), 0.0, 0.0, 0.0  # of `_Usual`, as 
 _DEVIATIONS = *_PRIOR.deviations[:2], 10.0, 10.0, 10.0
 _LEAST = 0.01, 0.01, 0.005, 0.002, 0.03
 _HARDLY = 1e-6  # weight of what nothing tells of
-_LEAST_VARIANCE, _LEAST_SPREAD = 0.1, 0.5  # of gray values
+_LEAST_VARIANCE, _LEAST_SPREAD = 0.003, 0.05  # of gray values
 _GROUPS = 8  # of pixels of like gray values
 _OF_MEDIAN = 0.4549  # median of the square of a normal error
 _OUTLIERS = 16.0, 8.0, *([4.0] * 10)  # deviations that quarter a weight, in rounds
@@ -66,47 +67,56 @@ def jointly(gray: np.ndarray, rings: Aligned, family: CircleFamily) -> Aligned:
     """
     small = np.flatnonzero(frame.ellipse_axes(rings.frames)[0] <= _LARGEST)
     likeliest = small[np.argsort(-rings.plain[small], kind='stable')[:_TELLING]]
+    known = ~clipped(gray)
     tried = [
-        (image, *_told(image, rings.select(likeliest), family, gamma))
+        (image, *_told(image, known, rings.select(likeliest), family, gamma))
         for image, gamma in ((gray, 1.0), (as_light(gray), GAMMA))
     ]
     image, usual, _ = min(tried, key=itemgetter(2))
-    fits = _fits(image, rings.select(small), family, usual)
+    fits = _fits(image, known, rings.select(small), family, usual)
     if not fits:
         return rings
-    placed = Aligned.joined([fit.placed for fit in fits.values()])
-    return rings.replaced(small[list(fits)], placed)
+    rows = small[list(fits)]
+    placed = Aligned.joined(
+        [fit.placed(rings.select(small[row : row + 1])) for row, fit in fits.items()]
+    )
+    moved = placed.frames[:, :2, 2] - rings.frames[rows, :2, 2]
+    deviations = np.sqrt(
+        np.einsum('ki,kij,kj->k', moved, np.linalg.inv(rings.covariance[rows]), moved)
+    )
+    near = (np.hypot(*moved.T) <= _MOST_MOVED[0]) | (deviations <= _MOST_MOVED[1])
+    return rings.replaced(rows[near], placed.select(near))
 
 
 def _told(
-    gray: np.ndarray, rings: Aligned, family: CircleFamily, gamma: float
+    gray: np.ndarray, known: np.ndarray, rings: Aligned, family: CircleFamily, gamma: float
 ) -> tuple[_Usual, float]:
     """Return what targets tell of others, and the usual error of gray values.
 
     The error is that of the image as it was taken, which has a gamma that this one has not.
     """
     usual = _Usual(camera=Prior.of_camera(_aligned(gray, rings, family, _PRIOR)[0]))
-    fits = list(_fits(gray, rings, family, usual).values())
+    fits = list(_fits(gray, known, rings, family, usual).values())
     if not fits:
         return usual, math.inf
     errors = [
-        np.abs(of.errors) / (gamma * (of.patch.seen.clip(1) / 255) ** (1 - 1 / gamma))
+        np.abs(of.errors) / (gamma * (of.patch.seen / 255).clip(255**-gamma) ** (1 - 1 / gamma))
         for of in fits
     ]
     return usual.after(fits), float(np.quantile(np.concatenate(errors), _LARGER))
 
 
 def _fits(
-    gray: np.ndarray, rings: Aligned, family: CircleFamily, usual: _Usual
+    gray: np.ndarray, known: np.ndarray, rings: Aligned, family: CircleFamily, usual: _Usual
 ) -> dict[int, _Fit]:
     """Return what forms the pixels of targets, by their rows, where enough of these are known."""
     fits = {}
     rings, lights = _aligned(gray, rings, family, usual.camera)
     for index, circles in enumerate(signed_circles(family, rings.ids)):
         own, light = rings.select(slice(index, index + 1)), lights.select(slice(index, index + 1))
-        patch = Patch.about(gray, own, circles, light, MAXIMUM_SHIFT * family.narrow)
+        patch = Patch.about(gray, known, own, circles, light, MAXIMUM_SHIFT * family.narrow)
         if len(patch.seen) > _FEWEST:
-            fits[index] = _fit(patch, patch.first(own, light), own, usual)
+            fits[index] = _fit(patch, usual.first(patch.first(own, light)), usual)
     return fits
 
 
@@ -123,7 +133,6 @@ def _aligned(
 class _Fit:
     """What forms the pixels of a target."""
 
-    rings: Aligned  # of this target, as they were before, (1,)
     patch: Patch
     formed: Formed
     shown: np.ndarray  # gray values that are formed, of pixels that are known, (n,)
@@ -142,14 +151,9 @@ class _Fit:
         telling = np.abs(self.formed.heights) > _SHOWN
         return values[telling], variances[telling]
 
-    @property
-    def placed(self) -> Aligned:
-        """The rings where the fit is, unless that is too far away."""
-        formed, rings = self.formed, self.rings
-        moved = formed.frame[:2, 2] - rings.frames[0, :2, 2]
-        deviations = math.sqrt(moved @ np.linalg.solve(rings.covariance[0], moved))
-        if np.hypot(*moved) > _MOST_MOVED[0] and deviations > _MOST_MOVED[1]:
-            return rings
+    def placed(self, rings: Aligned) -> Aligned:
+        """Return the rings of this target, (1,), where the fit is."""
+        formed = self.formed
         affine = frame.local_affine(formed.frame[None])[0]
         covariance = _OF_VARIANCE * affine @ self.covariance[:2, :2] @ affine.T
         return replace(
@@ -194,6 +198,11 @@ class _Usual:
                 deviations[index] = math.sqrt(max(own, square / len(of_all), least[index] ** 2))
         return _Usual(self.camera, values, deviations, _noise(fits))
 
+    def first(self, formed: Formed) -> Formed:
+        """Return what forms pixels, with the contrast that is usual if that is known."""
+        known = self.deviations[2] < _DEVIATIONS[2]
+        return replace(formed, contrast=float(self.values[2])) if known else formed
+
     def variances(self, shown: np.ndarray) -> np.ndarray:
         """Return the variances of gray values."""
         variances: np.ndarray = self.noise[0] + self.noise[1] * np.maximum(shown, 0)
@@ -218,7 +227,7 @@ class _Usual:
         return normal, right
 
 
-def _fit(patch: Patch, formed: Formed, rings: Aligned, usual: _Usual) -> _Fit:
+def _fit(patch: Patch, formed: Formed, usual: _Usual) -> _Fit:
     """Return what forms the pixels of a target, from what nearly does."""
     seen, damping = patch.seen, _DAMPING[0]
     weights = 1 / usual.variances(seen)
@@ -257,7 +266,7 @@ def _fit(patch: Patch, formed: Formed, rings: Aligned, usual: _Usual) -> _Fit:
             break
     plain = patch.shown(formed)
     shown = _paper(weights, plain, seen) * plain
-    return _Fit(rings, patch, formed, shown, np.linalg.inv(normal)[:-1, :-1])
+    return _Fit(patch, formed, shown, np.linalg.inv(normal)[:-1, :-1])
 
 
 def _paper(weights: np.ndarray, plain: np.ndarray, seen: np.ndarray) -> float:

@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ahf_ros.detectors.cctag.light import Lights, usual_widths
-from ahf_ros.detectors.cctag.rays import clipped
 from ahf_ros.detectors.cctag.rings import Aligned
 from ahf_ros.detectors.cctag.templates import MASK
 from ahf_ros.features import frame
@@ -32,7 +31,7 @@ _MARGIN = 3  # px about the pixels, that blur mixes with them
 _OF_INTERPOLATION = 0.17  # variance that reading between pixels adds to the blur of rays, px^2
 _BLURS = 0.35, 2.0  # px
 _DARKEST = -0.99  # contrast
-_MOST_CURVED, _WIDEST = 1.5, 0.0  # edges of light: radii of curvature, ln of radii
+_MOST_CURVED, _HIGHEST, _WIDEST = 1.5, 5.0, 0.0  # edges of light: 1 / radii, ln, ln of radii
 _MOST_OF_FRAME, _MOST = 0.08, 0.3  # changes at once
 _APART = 1.02  # ratio of the blurs whose difference is taken
 
@@ -80,6 +79,7 @@ class Formed:
         change = np.clip(change, -_MOST, _MOST)
         edges = self.edges + change[EDGES:].reshape(-1, OF_EDGE)
         edges[:, _CURVATURE] = edges[:, _CURVATURE].clip(-_MOST_CURVED, _MOST_CURVED)
+        edges[:, _HEIGHT] = edges[:, _HEIGHT].clip(-_HIGHEST, _HIGHEST)
         edges[:, _WIDTH] = np.minimum(edges[:, _WIDTH], _WIDEST)
         return Formed(
             frame=frame.moved(self.frame[None], of_frame[None])[0],
@@ -109,29 +109,35 @@ class Patch:
 
     @staticmethod
     def about(
-        gray: np.ndarray, rings: Aligned, circles: np.ndarray, light: Lights, most_shift: float
+        gray: np.ndarray,
+        known: np.ndarray,
+        rings: Aligned,
+        circles: np.ndarray,
+        light: Lights,
+        most_shift: float,
     ) -> Patch:
         """Return the pixels about the rings of one target, and in its light.
 
-        Ink has not grown by more than `most_shift`, in radii.
+        Pixels of an image are `known` unless the camera has clipped them. Ink has not grown by
+        more than `most_shift`, in radii.
         """
         target = rings.frames[0]
         reach = math.ceil(_REACH * frame.ellipse_axes(target[None])[0][0]) + 1
         middle = np.rint(target[:2, 2]).astype(int)
         low = np.maximum(middle - reach, 0)
         high = np.minimum(middle + reach + 1, gray.shape[::-1])
-        seen = gray[low[1] : high[1], low[0] : high[0]].astype(np.float64)
+        about = slice(low[1], high[1]), slice(low[0], high[0])
         x, y = (np.arange(of, to, dtype=float) for of, to in zip(low, high, strict=True))
         fine_x, fine_y = (
             np.arange(of[0] - _MARGIN, of[-1] + _MARGIN + 1 / _FINE, 1 / _FINE) for of in (x, y)
         )
         place = _in_plane(target, _grid(x, y))
-        known = (np.hypot(*place) < _REACH) & ~clipped(seen)
+        known = (np.hypot(*place) < _REACH) & known[about]
         points = _grid(fine_x, fine_y)
         light_x, light_y = _in_plane(light.frames[0], points)
         return Patch(
             known=known,
-            seen=seen[known],
+            seen=gray[about][known].astype(np.float64),
             points=points.astype(np.float32),
             light_x=light_x.astype(np.float32),
             light_y=light_y.astype(np.float32),
