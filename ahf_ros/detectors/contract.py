@@ -104,7 +104,7 @@ class Refiner(Protocol):
 
 
 @runtime_checkable
-class Drafter(Refiner, Protocol):
+class Drafter(Protocol):
     """A `Refiner` that also identifies faster, with centres good enough for `refine`.
 
     AHF tries its filters with drafts.
@@ -157,7 +157,7 @@ class Searching(Protocol):
     """A detector that begins with the pyramid of an image, which detectors of one image share."""
 
     def search(self, pyramid: ImagePyramid) -> list[Target]:
-        """Identify the targets of one image, as a call does, or a draft of a `Drafter`."""
+        """Identify the targets of one image, as a call does."""
         ...
 
 

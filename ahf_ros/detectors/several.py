@@ -64,33 +64,26 @@ class SeveralDetector:
 
     def __call__(self, image: np.ndarray) -> list[Target]:
         """Identify the targets of one image; see `Detector`."""
-        drafters = [it if isinstance(it, Drafter) else None for it in self.parts]
-        return self._refined(image, self.draft(image), drafters)
+        return self._merged(self._found(image, lambda it: it(image)))
 
     def draft(self, image: np.ndarray) -> list[Target]:
-        """Identify targets as a call does, with rough centres where a detector is faster so.
-
-        Detectors that search for dots do so together.
-        """
-        check_image(image)
-        pyramid = None
-        if sum(isinstance(it, Searching) for it in self.parts) > 1:
-            pyramid = replace(
-                image_pyramid(as_gray(image), self.settings.max_radius),
-                common=CommonSearch(self.settings.radii[0], self.settings.polarities),
-            )
+        """Identify targets as a call does, with rough centres where a detector is faster so."""
 
         def drafted(it: Detector) -> list[Target]:
-            if pyramid and isinstance(it, Searching):
-                return it.search(pyramid)
             return it.draft(image) if isinstance(it, Drafter) else it(image)
 
-        return self._merged([drafted(it) for it in self.parts])
+        return self._merged(self._found(image, drafted))
 
     def refine(self, image: np.ndarray, targets: Sequence[Target]) -> list[Target]:
         """Return targets with the centres that the detectors of their families find."""
-        refiners = [it if isinstance(it, Refiner) else None for it in self.parts]
-        return self._refined(image, targets, refiners)
+        found = list(targets)
+        for part, families in zip(self.parts, self.of_parts, strict=True):
+            which = [index for index, it in enumerate(found) if it.family in families]
+            if which and isinstance(part, Refiner):
+                moved = part.refine(image, [found[index] for index in which])
+                for index, target in zip(which, moved, strict=True):
+                    found[index] = target
+        return found
 
     def expecting(self, ids: frozenset[int]) -> SeveralDetector:
         """Return a detector that knows which IDs are likely; see `Expecting`."""
@@ -106,18 +99,20 @@ class SeveralDetector:
         """Return the detector of some of the families; see `Narrowing`."""
         return self.narrow(families)
 
-    def _refined(
-        self, image: np.ndarray, targets: Sequence[Target], parts: Sequence[Refiner | None]
-    ) -> list[Target]:
-        """Return targets as some detectors refine those of their families."""
-        found = list(targets)
-        for part, families in zip(parts, self.of_parts, strict=True):
-            which = [index for index, it in enumerate(found) if it.family in families]
-            if which and part is not None:
-                moved = part.refine(image, [found[index] for index in which])
-                for index, target in zip(which, moved, strict=True):
-                    found[index] = target
-        return found
+    def _found(
+        self, image: np.ndarray, alone: Callable[[Detector], list[Target]]
+    ) -> list[list[Target]]:
+        """Return the targets of each detector; those that search for dots do so together."""
+        check_image(image)
+        if sum(isinstance(it, Searching) for it in self.parts) < 2:
+            return [alone(it) for it in self.parts]
+        pyramid = replace(
+            image_pyramid(as_gray(image), self.settings.max_radius),
+            common=CommonSearch(self.settings.radii[0], self.settings.polarities),
+        )
+        return [
+            it.search(pyramid) if isinstance(it, Searching) else alone(it) for it in self.parts
+        ]
 
     def _merged(self, results: Sequence[Sequence[Target]]) -> list[Target]:
         """Return the targets of all detectors that own their places."""

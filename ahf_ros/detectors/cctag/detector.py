@@ -8,7 +8,7 @@ what is left, the rings of several IDs are brought onto the image, and the best 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
@@ -19,7 +19,7 @@ from ahf_ros.blas import one_blas_thread
 from ahf_ros.codes import CCTAG_NAMES
 from ahf_ros.codes.cctag import CircleFamily, circle_family
 from ahf_ros.detectors.cctag.glance import Glance, likely_rings
-from ahf_ros.detectors.cctag.joint import jointly
+from ahf_ros.detectors.cctag.joint import contested, jointly
 from ahf_ros.detectors.cctag.light import EDGES
 from ahf_ros.detectors.cctag.rings import Aligned, Prior, align, identify, in_light
 from ahf_ros.detectors.claims import best_targets
@@ -53,9 +53,6 @@ _PLAUSIBLE = 0.6  # share of rays that agree, of a target that is measured again
 _SAME_PLACE = 0.5  # distance of two readings of one target, radii
 _MAXIMUM_MOVE, _MAXIMUM_MOVE_SHARE = 1.0, 0.1  # that a centre is moved: px, radii
 
-Place = Callable[[np.ndarray, Aligned, CircleFamily], Aligned]
-"""From an image and rings in place to about a tenth of a px, to rings in better places."""
-
 
 @dataclass(frozen=True, slots=True)
 class CctagDetector(FamilyDetector):
@@ -70,18 +67,14 @@ class CctagDetector(FamilyDetector):
 
     def __call__(self, image: np.ndarray) -> list[Target]:
         """Identify the targets of one image; see `Detector`."""
-        return self.refine(image, self.draft(image))
-
-    def draft(self, image: np.ndarray) -> list[Target]:
-        """Identify the targets of one image, with places as rays tell them; see `Drafter`."""
         check_image(image)
         return self.search(image_pyramid(as_gray(image), self.settings.max_radius))
 
     @one_blas_thread()
     def search(self, pyramid: ImagePyramid) -> list[Target]:
-        """Identify the targets of one image as a draft does; see `Searching`."""
+        """Identify the targets of one image; see `Searching`."""
         found = targets_of_octaves(
-            _doubled(pyramid), self.settings.radii, self._identify, self._brought
+            _doubled(pyramid), self.settings.radii, self._identify, self.refine
         )
         return sorted_targets(best_targets(found, 1.0))
 
@@ -93,13 +86,7 @@ class CctagDetector(FamilyDetector):
         be, stay as they are.
         """
         check_image(image)
-        return self._brought(as_gray(image), targets, jointly)
-
-    def _brought(
-        self, gray: np.ndarray, targets: Sequence[Target], place: Place | None = None
-    ) -> list[Target]:
-        """Return targets with the places that rays tell, or that are found from there."""
-        gray = gray.astype(np.float32, copy=False)
+        gray = as_gray(image).astype(np.float32, copy=False)
         refined = list(targets)
         for family in self.design:
             known = [it for it in targets if it.id != UNDECODED and it.family == family.name]
@@ -119,8 +106,7 @@ class CctagDetector(FamilyDetector):
             moved = np.hypot(*(of.frames[:, :2, 2] - start[:, :2, 2]).T)
             reach = np.maximum(_MAXIMUM_MOVE, _MAXIMUM_MOVE_SHARE * frame.mean_radii(start))
             good = (moved <= reach) & (of.rays >= _PLAUSIBLE)
-            if place:
-                of = of.replaced(good, place(gray, of.select(good), family))
+            of = of.replaced(good, jointly(gray, of.select(good), family))
             places = ellipse_fields(of.frames, of.covariance, of.edge_shift)
             refined = moved_targets(refined, known, places, good)
         return refined
@@ -134,8 +120,9 @@ class CctagDetector(FamilyDetector):
             for family in self.design:
                 frames = likely_rings(glances, octave.radii, polarity, family)
                 rings, light = _identified(gray, frames, polarity, family)
-                rings = _single(_together(rings))
-                found += self._shown(_owned(light, rings, polarity, family), family.name)
+                rings = _owned(light, _single(_together(rings)), polarity, family)
+                rings = contested(gray, rings, polarity, family)
+                found += self._shown(_single(rings), family.name)
         return found
 
     def _shown(self, rings: Aligned, family: str) -> list[Target]:

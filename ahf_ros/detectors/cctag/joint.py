@@ -1,286 +1,212 @@
 """The rings of CCTags and the light on them, fitted to pixels together.
 
 Rays know the light before the rings, and divide by it what the lens has mixed, which costs half of
-the precision where targets are small. Here the frame, the edges of the print and those of light
-are fitted to the pixels at once, by robust least squares (Levenberg and Marquardt). Print, lens
-and projector are the same for all targets of an image, so that some of them tell what is usual
-before all are fitted. The variance of gray values grows with the light, as that of photons does.
+the precision where targets are small, and doubts. Here the frame, the edges of the print and those
+of light are fitted to the pixels at once, for the place of targets and for doubtful IDs.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from operator import itemgetter
 
 import numpy as np
 
 from ahf_ros.codes.cctag import CircleFamily
-from ahf_ros.detectors.cctag.light import Lights
-from ahf_ros.detectors.cctag.patch import (
-    BLUR,
-    EDGES,
-    OF_EDGE,
-    OF_LIGHT,
-    PERSPECTIVE,
-    PRINT,
-    SHIFT,
-    Formed,
-    Patch,
-)
+from ahf_ros.detectors.cctag.fit import Fit, Usual, fitted
+from ahf_ros.detectors.cctag.light import EDGES, Lights
+from ahf_ros.detectors.cctag.patch import Patch
 from ahf_ros.detectors.cctag.rays import clipped
-from ahf_ros.detectors.cctag.rings import GAMMA, Aligned, Prior, align, as_light, usual_perspective
+from ahf_ros.detectors.cctag.rings import GAMMA, Aligned, Prior, align, as_light, likely_ids
 from ahf_ros.detectors.cctag.templates import MAXIMUM_SHIFT, signed_circles
 from ahf_ros.features import frame
-from ahf_ros.features.robust import NORMAL, geman_mcclure
 
 _LARGEST = 32.0  # px: rays place the rings of larger targets as well, and much faster
 _TELLING = 16  # targets that tell what is usual
-_ENOUGH = 4  # of them, and of edges of light
-_SHOWN = 0.3  # ln of the height of an edge of light that tells
-_NEAR = 0.3, 0.3, 0.4, 1.0, 0.3  # deviations of an edge of light from where it was
-_PRIOR = Prior()
-_VALUES = _PRIOR.shift, math.log(_PRIOR.blur), 0.0, 0.0, 0.0  # of `_Usual`, as the next
-_DEVIATIONS = *_PRIOR.deviations[:2], 10.0, 10.0, 10.0
-_LEAST = 0.01, 0.01, 0.005, 0.002, 0.03
-_HARDLY = 1e-6  # weight of what nothing tells of
-_LEAST_VARIANCE, _LEAST_SPREAD = 0.003, 0.05  # of gray values
-_GROUPS = 8  # of pixels of like gray values
-_OF_MEDIAN = 0.4549  # median of the square of a normal error
-_OUTLIERS = 16.0, 8.0, *([4.0] * 10)  # deviations that quarter a weight, in rounds
 _LARGER = 0.9  # quantile of errors that tell which model is right
 _FEWEST = 60  # pixels that are fitted
-_FREE = 10  # of them, that are not needed for a fit: at least
-_TRIALS = 4
-_DAMPING = 1e-3, 1e-4  # at first, and at least
-_STAYING, _BY_PLACE = 1e-3, 10.0  # move of a centre, px, and of edges by that
-_MOST_MOVED = 0.25, 5.0  # px, and deviations of the place that rays give
-_OF_VARIANCE = 1.4  # of gray values, that their model adds
-_SYSTEMATIC = 0.003  # standard deviation of what the model does to a centre, px
+_UNUSUAL = 2.0  # deviations of a misfit, from which other light and other IDs are tried
+_MOST_UNUSUAL = 5.0  # the same, up to which the place is that of the rings
+_HOPELESS = 12.0  # the same, from which no ID is tried
+_CERTAIN, _ENOUGH = 0.98, 4  # confidence of targets that tell of doubtful ones, and their number
+_PROBABLE = 0.75  # probability of a target, from which it is placed
+_POSSIBLE, _MOST = 0.05, 128  # the same, from which it is read again, and number of these
+_RIVALS = 12  # IDs that rays may show
+_ODDS, _LESS = 6.0, 1.5  # ln of the odds of a target that is usual, less by each deviation
+_OF_MARGIN = 0.1  # share of ln of the odds of IDs, by pixels, that is believed
 
 
 def jointly(gray: np.ndarray, rings: Aligned, family: CircleFamily) -> Aligned:
     """Return rings (k,) that are in place to a part of a px, with places that pixels give.
 
-    Large ones, those that clipping hides, and those that would move farther than they can be wrong
-    stay as they are.
+    Large ones, and those that the model does not explain as well as others, stay as they are.
     """
-    small = np.flatnonzero(frame.ellipse_axes(rings.frames)[0] <= _LARGEST)
-    likeliest = small[np.argsort(-rings.plain[small], kind='stable')[:_TELLING]]
-    known = ~clipped(gray)
-    tried = [
-        (image, *_told(image, known, rings.select(likeliest), family, gamma))
-        for image, gamma in ((gray, 1.0), (as_light(gray), GAMMA))
-    ]
-    image, usual, _ = min(tried, key=itemgetter(2))
-    fits = _fits(image, known, rings.select(small), family, usual)
-    if not fits:
-        return rings
-    rows = small[list(fits)]
-    placed = Aligned.joined(
-        [fit.placed(rings.select(small[row : row + 1])) for row, fit in fits.items()]
-    )
-    moved = placed.frames[:, :2, 2] - rings.frames[rows, :2, 2]
-    deviations = np.sqrt(
-        np.einsum('ki,kij,kj->k', moved, np.linalg.inv(rings.covariance[rows]), moved)
-    )
-    near = (np.hypot(*moved.T) <= _MOST_MOVED[0]) | (deviations <= _MOST_MOVED[1])
-    return rings.replaced(rows[near], placed.select(near))
+    small = np.flatnonzero(_small(rings))
+    scene = _Scene.of(gray, rings.select(small), family)
+    for row, fit in scene.fits(rings.select(small)).items():
+        which = small[row : row + 1]
+        rings = rings.replaced(which, scene.placed(rings.select(which), fit))
+    return rings
 
 
-def _told(
-    gray: np.ndarray, known: np.ndarray, rings: Aligned, family: CircleFamily, gamma: float
-) -> tuple[_Usual, float]:
-    """Return what targets tell of others, and the usual error of gray values.
+def contested(gray: np.ndarray, rings: Aligned, polarity: int, family: CircleFamily) -> Aligned:
+    """Return readings (k,) with the places that pixels give; IDs in doubt are those of pixels.
 
-    The error is that of the image as it was taken, which has a gamma that this one has not.
+    IDs need enough certain targets, which tell how well rings are seen in this image.
     """
-    usual = _Usual(camera=Prior.of_camera(_aligned(gray, rings, family, _PRIOR)[0]))
-    fits = list(_fits(gray, known, rings, family, usual).values())
-    if not fits:
-        return usual, math.inf
-    errors = [
-        np.abs(of.errors) / (gamma * (of.patch.seen / 255).clip(255**-gamma) ** (1 - 1 / gamma))
-        for of in fits
-    ]
-    return usual.after(fits), float(np.quantile(np.concatenate(errors), _LARGER))
+    enough = (_small(rings) & (rings.confidence >= _CERTAIN)).sum() >= _ENOUGH
+    least = _POSSIBLE if enough else _PROBABLE
+    which = np.flatnonzero(_small(rings) & (rings.of_target >= least))
+    which = which[np.argsort(-rings.of_target[which], kind='stable')[:_MOST]]
+    own = rings.select(which)
+    certain = own.confidence >= _CERTAIN
+    scene = _Scene.of(gray, own.select(certain) if enough else own, family)
+    for row, fit in scene.fits(own).items():
+        reading = own.select(slice(row, row + 1))
+        unusual = scene.usual.unusual(fit)
+        if enough and not (certain[row] and unusual <= _UNUSUAL):
+            if unusual < _HOPELESS:
+                reading, fit = scene.likeliest(reading, polarity, fit)
+            reading = replace(reading, by_pixels=scene.odds(fit))
+        rings = rings.replaced(which[row : row + 1], scene.placed(reading, fit))
+    return rings
 
 
-def _fits(
-    gray: np.ndarray, known: np.ndarray, rings: Aligned, family: CircleFamily, usual: _Usual
-) -> dict[int, _Fit]:
-    """Return what forms the pixels of targets, by their rows, where enough of these are known."""
-    fits = {}
-    rings, lights = _aligned(gray, rings, family, usual.camera)
-    for index, circles in enumerate(signed_circles(family, rings.ids)):
-        own, light = rings.select(slice(index, index + 1)), lights.select(slice(index, index + 1))
-        patch = Patch.about(gray, known, own, circles, light, MAXIMUM_SHIFT * family.narrow)
-        if len(patch.seen) > _FEWEST:
-            fits[index] = _fit(patch, usual.first(patch.first(own, light)), usual)
-    return fits
-
-
-def _aligned(
-    gray: np.ndarray, rings: Aligned, family: CircleFamily, camera: Prior
-) -> tuple[Aligned, Lights]:
-    """Return rings that are brought onto an image, and the lights about them."""
-    lights = Lights.about(gray, rings.frames)
-    of = align(gray, rings.frames, rings.ids, rings.edges, family, camera, lights)
-    return of, lights
+def _small(rings: Aligned) -> np.ndarray:
+    small: np.ndarray = frame.ellipse_axes(rings.frames)[0] <= _LARGEST
+    return small
 
 
 @dataclass(frozen=True, slots=True)
-class _Fit:
-    """What forms the pixels of a target."""
+class _Scene:
+    """An image whose gray values are light, and what is known of its targets."""
 
-    patch: Patch
-    formed: Formed
-    shown: np.ndarray  # gray values that are formed, of pixels that are known, (n,)
-    covariance: np.ndarray  # of the parameters, (p, p)
+    gray: np.ndarray
+    known: np.ndarray  # bool, which pixels the camera has not clipped
+    family: CircleFamily
+    usual: Usual
 
-    @property
-    def errors(self) -> np.ndarray:
-        """Gray values less those that are formed, (n,)."""
-        return self.patch.seen - self.shown
+    @staticmethod
+    def of(gray: np.ndarray, rings: Aligned, family: CircleFamily) -> _Scene:
+        """Return an image with what the likeliest of targets tell, gamma with it."""
+        telling = rings.select(np.argsort(-rings.plain, kind='stable')[:_TELLING])
+        known = ~clipped(gray)
+        tried = [
+            _Scene(image, known, family, Usual())._told(telling, gamma)
+            for image, gamma in ((gray, 1.0), (as_light(gray), GAMMA))
+        ]
+        return min(tried, key=itemgetter(1))[0]
 
-    @property
-    def of_light(self) -> tuple[np.ndarray, np.ndarray]:
-        """What is alike of all edges of light, and its variances, of edges that tell, (e, 2)."""
-        values, scales = self.formed.of_light(self.patch.light_size)
-        variances = np.diag(self.covariance)[EDGES:].reshape(-1, OF_EDGE)[:, OF_LIGHT] * scales**2
-        telling = np.abs(self.formed.heights) > _SHOWN
-        return values[telling], variances[telling]
+    def fits(self, rings: Aligned) -> dict[int, Fit]:
+        """Return what forms the pixels of targets, by their rows, where enough are known.
 
-    def placed(self, rings: Aligned) -> Aligned:
-        """Return the rings of this target, (1,), where the fit is."""
-        formed = self.formed
-        affine = frame.local_affine(formed.frame[None])[0]
-        covariance = _OF_VARIANCE * affine @ self.covariance[:2, :2] @ affine.T
+        Where the pixels are unlike what is usual, light of fewer edges is tried.
+        """
+        fits: dict[int, Fit] = {}
+        rows = np.arange(len(rings.ids))
+        for most in range(EDGES, 0, -1):
+            for row, fit in zip(rows.tolist(), self._fits(rings.select(rows), most), strict=True):
+                if fit and (row not in fits or fit.cost(self.usual) < fits[row].cost(self.usual)):
+                    fits[row] = fit
+            unusual = [row for row, fit in fits.items() if self.usual.unusual(fit) > _UNUSUAL]
+            rows = np.array(unusual, int)
+        return fits
+
+    def _fits(self, rings: Aligned, most: int = EDGES) -> list[Fit | None]:
+        fits: list[Fit | None] = []
+        rings, lights = self._aligned(rings, self.usual.camera, most)
+        most_shift = MAXIMUM_SHIFT * self.family.narrow
+        for row, circles in enumerate(signed_circles(self.family, rings.ids)):
+            own, light = (rings.select(slice(row, row + 1)), lights.select(slice(row, row + 1)))
+            patch = Patch.about(self.gray, self.known, own, circles, light, most_shift)
+            if len(patch.seen) > _FEWEST:
+                first = self.usual.first(patch.first(own, light))
+                fits.append(fitted(patch, first, self.usual))
+            else:
+                fits.append(None)
+        return fits
+
+    def placed(self, rings: Aligned, fit: Fit) -> Aligned:
+        """Return the rings of a target, (1,), where a good fit is."""
+        if self.usual.unusual(fit) > _MOST_UNUSUAL:
+            return rings
         return replace(
             rings,
-            frames=formed.frame[None],
-            covariance=(covariance + _SYSTEMATIC**2 * np.eye(2))[None],
-            shift=np.array([formed.shift]),
-            blur=np.array([formed.blur_of_rays]),
+            frames=fit.formed.frame[None],
+            covariance=fit.of_centre[None],
+            shift=np.array([fit.formed.shift]),
+            blur=np.array([fit.formed.blur_of_rays]),
         )
 
+    def odds(self, fit: Fit) -> np.ndarray:
+        """Return ln of the odds that a fit is of a target, (1,)."""
+        odds = _ODDS - _LESS * max(self.usual.unusual(fit), 0.0)
+        return np.array([max(odds, -_ODDS)])
 
-@dataclass(frozen=True, slots=True)
-class _Usual:
-    """What is known of the targets of an image before they are fitted.
+    def likeliest(self, rings: Aligned, polarity: int, fit: Fit) -> tuple[Aligned, Fit]:
+        """Return the reading of a target, (1,), that pixels show, and its fit.
 
-    Values, (5,), are growth of ink, px, ln of the blur of rays, px, contrast of ink, and of edges
-    of light the curvature towards where it is brighter, 1 / px, and ln of the width, px.
-    """
-
-    camera: Prior = _PRIOR
-    values: np.ndarray = field(default_factory=lambda: np.array(_VALUES))
-    deviations: np.ndarray = field(default_factory=lambda: np.array(_DEVIATIONS))
-    noise: tuple[float, float] = (1.0, 0.0)  # variance of black, and its growth by gray values
-
-    def after(self, fits: list[_Fit]) -> _Usual:
-        """Return what fits tell besides."""
-        of_print = np.array([of.formed.of_print for of in fits])
-        of_variances = np.array([np.diag(of.covariance)[PRINT] for of in fits])
-        of_light = (np.concatenate(of) for of in zip(*(it.of_light for it in fits), strict=True))
-        told = [
-            *zip(of_print.T, of_variances.T, strict=True),
-            *zip(*(of.T for of in of_light), strict=True),
-        ]
-        least = np.array(_LEAST)
-        least[2] *= 1 + abs(float(np.median(of_print[:, 2])))
-        values, deviations = self.values.copy(), self.deviations.copy()
-        for index, (of_all, variances) in enumerate(told):
-            if len(of_all) >= _ENOUGH:
-                values[index] = np.median(of_all)
-                square = (NORMAL * np.median(np.abs(of_all - values[index]))) ** 2
-                own = square - np.median(variances)
-                deviations[index] = math.sqrt(max(own, square / len(of_all), least[index] ** 2))
-        return _Usual(self.camera, values, deviations, _noise(fits))
-
-    def first(self, formed: Formed) -> Formed:
-        """Return what forms pixels, with the contrast that is usual if that is known."""
-        known = self.deviations[2] < _DEVIATIONS[2]
-        return replace(formed, contrast=float(self.values[2])) if known else formed
-
-    def variances(self, shown: np.ndarray) -> np.ndarray:
-        """Return the variances of gray values."""
-        variances: np.ndarray = self.noise[0] + self.noise[1] * np.maximum(shown, 0)
-        return variances
-
-    def prior(self, patch: Patch, formed: Formed) -> tuple[np.ndarray, np.ndarray]:
-        """Return the normal matrix (p, p) and the right side (p,) of what is known."""
-        weight, right = np.zeros((2, EDGES + formed.edges.size))
-        weight[:] = _HARDLY
-        weight[PRINT] = self.deviations[:3] ** -2
-        right[PRINT] = (self.values[:3] - formed.of_print) * weight[PRINT]
-        values, scales = formed.of_light(patch.light_size)
-        known = (scales / self.deviations[3:]) ** 2
-        of_edges, to_usual = (of[EDGES:].reshape(-1, OF_EDGE) for of in (weight, right))
-        of_edges[:] = np.array(_NEAR) ** -2
-        of_edges[:, OF_LIGHT] += known
-        to_usual[:, OF_LIGHT] = (self.values[3:] - values) / scales * known
-        normal = np.diag(weight)
-        perspective = usual_perspective(formed.frame[None])[0]
-        normal[PERSPECTIVE, PERSPECTIVE] += perspective
-        right[PERSPECTIVE] -= perspective @ formed.frame[2, :2]
-        return normal, right
-
-
-def _fit(patch: Patch, formed: Formed, usual: _Usual) -> _Fit:
-    """Return what forms the pixels of a target, from what nearly does."""
-    seen, damping = patch.seen, _DAMPING[0]
-    weights = 1 / usual.variances(seen)
-    for outlier in _OUTLIERS:
-        plain, changes = patch.derivatives(formed)
-        paper = _paper(weights, plain, seen)
-        shown = paper * plain
-        variances = usual.variances(shown)
-        errors = seen - shown
-        relative = errors / np.sqrt(variances)
-        spread = max(NORMAL * float(np.median(np.abs(relative))), _LEAST_SPREAD)
-        weights = geman_mcclure(1 / variances, relative / (outlier * spread))
-        free = max(float(weights @ variances) - len(changes), _FREE)
-        each = free / max(float(weights @ errors**2), 1e-9)
-        columns = np.concatenate([paper * changes, plain[None]])
-        normal = each * (columns * weights) @ columns.T
-        right = each * columns @ (weights * errors)
-        known, towards = usual.prior(patch, formed)
-        normal[:-1, :-1] += known
-        right[:-1] += towards
-        before, best = formed, float(weights @ errors**2)
-        for _ in range(_TRIALS):
-            change = np.linalg.solve(normal + damping * np.diag(np.diag(normal)), right)[:-1]
-            formed = before.changed(change, patch.most_shift)
-            plain = patch.shown(formed)
-            shown = _paper(weights, plain, seen) * plain
-            if float(weights @ (seen - shown) ** 2) <= best * (1 + _DAMPING[1]):
-                damping = max(damping / 5, _DAMPING[1])
+        Of IDs that rays may show, and those that differ in one ring or in all, the likeliest is
+        taken. That is repeated for this one until it stays.
+        """
+        fits = {int(rings.ids[0]): fit}
+        rivals = self._rivals(rings, polarity)
+        of_rivals = zip(rivals.ids.tolist(), self._fits(rivals), strict=True)
+        fits |= {number: of for number, of in of_rivals if of}
+        every = len(self.family.numbers) - 1
+        while True:
+            best = min(fits, key=lambda it: fits[it].cost(self.usual))
+            flips = [1 << bit for bit in range(every.bit_length())]
+            others = [best ^ flip for flip in (*flips, every) if best ^ flip not in fits]
+            if not others:
                 break
-            damping = max(10 * damping, _DAMPING[0])
-        else:
-            formed = before
-            break
-        moved = np.hypot(*(formed.frame - before.frame)[:2, 2])
-        if max(moved, *np.abs(change[[SHIFT, BLUR]]) / _BY_PLACE) < _STAYING:
-            break
-    plain = patch.shown(formed)
-    shown = _paper(weights, plain, seen) * plain
-    return _Fit(patch, formed, shown, np.linalg.inv(normal)[:-1, :-1])
+            circles = signed_circles(self.family, np.array(others))
+            for other, of in zip(others, circles, strict=True):
+                patch = replace(fits[best].patch, circles=of)
+                fits[other] = fitted(patch, fits[best].formed, self.usual)
+        cost, next_cost = sorted(it.cost(self.usual) for it in fits.values())[:2]
+        margin = _OF_MARGIN * (next_cost - cost)
+        return replace(rings, ids=np.array([best]), margin=np.array([margin])), fits[best]
 
+    def _rivals(self, rings: Aligned, polarity: int) -> Aligned:
+        """Return readings of a target, (1,), by other IDs that rays may show."""
+        lights, camera = Lights.about(self.gray, rings.frames), self.usual.camera
+        starts, ids, edges, _ = likely_ids(
+            self.gray, lights, polarity, self.family, camera, _RIVALS
+        )
+        numbers, first = np.unique(ids[0], return_index=True)
+        first = first[numbers != rings.ids[0]]
+        shift, blur, sharpening = edges[0, first].T
+        return replace(
+            rings.select(np.zeros(len(first), int)),
+            frames=starts[0, first],
+            ids=ids[0, first],
+            shift=shift,
+            blur=blur,
+            sharpening=sharpening,
+        )
 
-def _paper(weights: np.ndarray, plain: np.ndarray, seen: np.ndarray) -> float:
-    """Return the gray value of paper in full light."""
-    return float(weights * plain @ seen) / max(float(weights * plain @ plain), 1e-9)
+    def _told(self, rings: Aligned, gamma: float) -> tuple[_Scene, float]:
+        """Return what targets tell, and the usual error of gray values.
 
+        The error is that of the image as it was taken, which has a gamma that this one has not.
+        """
+        usual = replace(self.usual, camera=Prior.of_camera(self._aligned(rings, Prior())[0]))
+        scene = replace(self, usual=usual)
+        fits = list(scene.fits(rings).values())
+        if not fits:
+            return scene, math.inf
+        errors = [
+            np.abs(of.errors)
+            / (gamma * (of.patch.seen / 255).clip(255**-gamma) ** (1 - 1 / gamma))
+            for of in fits
+        ]
+        error = float(np.quantile(np.concatenate(errors), _LARGER))
+        return replace(scene, usual=usual.after(fits)), error
 
-def _noise(fits: list[_Fit]) -> tuple[float, float]:
-    """Return the variance of black, and how it grows by gray values."""
-    shown, squares = (
-        np.concatenate(of) for of in ([it.shown for it in fits], [it.errors**2 for it in fits])
-    )
-    groups = np.array_split(np.argsort(shown, kind='stable'), _GROUPS)
-    means = [float(shown[of].mean()) for of in groups]
-    variances = [float(np.median(squares[of])) / _OF_MEDIAN for of in groups]
-    slope, black = np.polyfit(means, variances, 1).tolist()
-    return max(black, _LEAST_VARIANCE), max(slope, 0.0)
+    def _aligned(self, rings: Aligned, camera: Prior, most: int = EDGES) -> tuple[Aligned, Lights]:
+        """Return rings that are brought onto the image, and the lights about them."""
+        lights = Lights.about(self.gray, rings.frames, most)
+        edges, family = rings.edges, self.family
+        return align(self.gray, rings.frames, rings.ids, edges, family, camera, lights), lights

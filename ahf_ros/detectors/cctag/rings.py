@@ -73,7 +73,7 @@ _INDEPENDENT = 0.3  # distance of independent readings along a profile, px
 _SYSTEMATIC = 0.004  # standard deviation of what pixels and interpolation do to a centre, px
 _CLEAREST = 0.2  # share of rays
 _AGREEING = 0.5  # share of what a ray shows, that the rings explain
-_OF_TARGET = np.array([-14.1, -1.5, 3.0, -1.0])  # of one, `clear`, `plain`, `unusual`
+_OF_TARGET = np.array([-14.1, -1.5, 3.0, -1.0, 1.0])  # of one, and of what follows
 _USUAL_EDGES = 0.13, 0.3  # deviations of growth, px, and of ln of the blur, of targets
 _GROWTH_HIDES = 3.0  # ln of odds, at the most growth
 _SHARPENING_HIDES = 0.8  # ln of odds, of an amount of 1
@@ -176,6 +176,7 @@ class Aligned(ArrayRecord):
     unusual: np.ndarray  # (k,), half the squares of deviations of edges, that leave a doubt
     known: np.ndarray  # (k,), share of gray values that are not clipped
     margin: np.ndarray  # (k,), ln of the odds against the next ID; NaN before it is known
+    by_pixels: np.ndarray  # (k,), ln of the odds that there is a target, by pixels: 0 if not asked
 
     @property
     def edges(self) -> np.ndarray:
@@ -195,7 +196,7 @@ class Aligned(ArrayRecord):
         large = np.maximum(np.log(size / self.blur / _USUAL_BLURS), 0)
         plain = self.plain - _BY_SIZE * np.minimum(np.log(size / _USUAL_SIZE), large)
         clear = np.maximum(self.clear, _AS_CLEAR)
-        features = [clear, np.clip(plain, *_PLAIN), self.unusual]
+        features = [clear, np.clip(plain, *_PLAIN), self.unusual, self.by_pixels]
         return logistic(np.stack(features, axis=1), _OF_TARGET)
 
     @property
@@ -205,7 +206,7 @@ class Aligned(ArrayRecord):
 
 
 NOTHING = Aligned(
-    *(np.zeros((0, 3, 3)), np.zeros(0, int), np.zeros((0, 2, 2)), *np.zeros((11, 0)))
+    *(np.zeros((0, 3, 3)), np.zeros(0, int), np.zeros((0, 2, 2)), *np.zeros((12, 0)))
 )
 
 
@@ -227,7 +228,7 @@ def identify(
     lights = lights.select(_shared(lit(gray, lights.moved, lights)) >= _SHARED)
     if not len(lights.frames):
         return NOTHING
-    starts, ids, edges, rings = _likely_ids(gray, lights, polarity, family, prior)
+    starts, ids, edges, rings = likely_ids(gray, lights, polarity, family, prior)
     if not rings.any():
         return NOTHING
     starts, ids, edges = (of[rings] for of in (starts, ids, edges))
@@ -236,7 +237,7 @@ def identify(
     first = align(gray, starts[:, 0], ids[:, 0], edges[:, 0], family, prior, lights)
     likely = first.of_target > _HOPELESS[0]
     lights = Lights.about(gray, first.frames[likely], most)
-    again = _likely_ids(gray, lights, polarity, family, prior)[:3]
+    again = likely_ids(gray, lights, polarity, family, prior)[:3]
     starts, ids, edges = (
         np.concatenate([more, of[likely]], axis=1)
         for of, more in zip((starts, ids, edges), again, strict=True)
@@ -298,8 +299,13 @@ def _settled(
     return rings
 
 
-def _likely_ids(
-    gray: np.ndarray, lights: Lights, polarity: int, family: CircleFamily, prior: Prior
+def likely_ids(
+    gray: np.ndarray,
+    lights: Lights,
+    polarity: int,
+    family: CircleFamily,
+    prior: Prior,
+    count: int = _READINGS,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Return frames, (k, n, 3, 3), of IDs that profiles are like, (k, n), and edges, (k, n, 3).
 
@@ -325,7 +331,7 @@ def _likely_ids(
     rows = np.arange(len(frames))
     profile = profiles[shares.max(axis=2).argmax(axis=0), rows]
     rings = _unlike_discs(profile, shares.max(axis=(0, 2)), frames)
-    order = np.argsort(-shares.max(axis=0), axis=1, kind='stable')[:, :_READINGS]
+    order = np.argsort(-shares.max(axis=0), axis=1, kind='stable')[:, :count]
     # Where narrow and wide rings take turns, growth of the ink makes one word the other.
     order = np.concatenate([order, family.numbers[-1] - order[:, :1]], axis=1)
     rows = rows[:, None]
@@ -483,6 +489,7 @@ def _aligned(
         + _hiding(shift, sharpening, known, family.narrow * size),
         known=known,
         margin=np.full(count, np.nan),
+        by_pixels=np.zeros(count),
     )
 
 
