@@ -45,7 +45,6 @@ _TELLING = 0.98  # confidence of targets that tell of others
 _CLEAR_OF_RIVALS = 19.0  # odds of the place of an ID against all others
 _SURE = 0.999  # confidence of targets that neither rivals nor another family put in doubt
 _PROBABLE = 0.5  # confidence of targets that tell of edges together
-_ROUNDS = 2  # in which doubtful targets are read with what others tell
 _POSSIBLE = 0.01  # probability of a target, from which it is read again
 _CERTAIN = 0.75  # confidence from which a target is reported
 _SURE_OF_TARGET = 0.9  # probability of a target, from which it is reported without its ID
@@ -160,19 +159,16 @@ def _identified(
     sure = (possible.confidence >= _SURE) & (again.of_target >= _SURE)
     told = replace(again, margin=possible.margin).select(sure)
     again = identify(light, frames[_alone(frames, told.frames)], polarity, family, camera)
-    known, rings = camera, _best(_renewed(rings, Aligned.joined([told, again])), camera)
-    for _ in range(_ROUNDS):
-        sure = rings.of_target >= _SURE_OF_TARGET
-        prior = Prior.after(rings.select(sure & (rings.confidence >= _PROBABLE)))
-        if prior == known:
-            break
-        known = prior
-        rings = _best(rings, prior)
-        certain = rings.select(rings.confidence >= _TELLING)
-        doubtful = np.concatenate([rings.frames, frames])
-        doubtful = doubtful[_alone(doubtful, certain.frames)]
-        again = _readings(light, doubtful, polarity, family, prior)
-        rings = _best(_renewed(rings, again), prior)
+    rings = _best(_renewed(rings, Aligned.joined([told, again])), camera)
+    sure = rings.of_target >= _SURE_OF_TARGET
+    prior = Prior.after(rings.select(sure & (rings.confidence >= _PROBABLE)))
+    if prior == camera:
+        return rings, light
+    rings = _best(rings, prior)
+    certain = rings.select(rings.confidence >= _TELLING)
+    doubtful = np.concatenate([rings.frames, frames])
+    again = _readings(light, doubtful[_alone(doubtful, certain.frames)], polarity, family, prior)
+    rings = _best(_renewed(rings, again), prior)
     return rings, light
 
 

@@ -13,7 +13,8 @@ from operator import itemgetter
 
 import numpy as np
 
-from ahf_ros.codes.cctag import CircleFamily
+from ahf_ros.codes import CCTAG_NAMES
+from ahf_ros.codes.cctag import CircleFamily, circle_family
 from ahf_ros.detectors.cctag.fit import Fit, Usual, fitted
 from ahf_ros.detectors.cctag.light import EDGES, Lights
 from ahf_ros.detectors.cctag.patch import Patch
@@ -33,7 +34,7 @@ _CERTAIN, _ENOUGH = 0.98, 4  # confidence of targets that tell of doubtful ones,
 _PROBABLE = 0.75  # probability of a target, from which it is placed
 _POSSIBLE, _MOST = 0.05, 128  # the same, from which it is read again, and number of these
 _RIVALS = 12  # IDs that rays may show
-_ODDS, _LESS = 6.0, 1.5  # ln of the odds of a target that is usual, less by each deviation
+_ODDS, _LESS = 6.0, 2.0  # ln of the odds of a target that is usual, less by each deviation
 _OF_MARGIN = 0.1  # share of ln of the odds of IDs, by pixels, that is believed
 
 
@@ -43,6 +44,8 @@ def jointly(gray: np.ndarray, rings: Aligned, family: CircleFamily) -> Aligned:
     Large ones, and those that the model does not explain as well as others, stay as they are.
     """
     small = np.flatnonzero(_small(rings))
+    if not len(small):
+        return rings
     scene = _Scene.of(gray, rings.select(small), family)
     for row, fit in scene.fits(rings.select(small)).items():
         which = small[row : row + 1]
@@ -51,13 +54,15 @@ def jointly(gray: np.ndarray, rings: Aligned, family: CircleFamily) -> Aligned:
 
 
 def contested(gray: np.ndarray, rings: Aligned, polarity: int, family: CircleFamily) -> Aligned:
-    """Return readings (k,) with the places that pixels give; IDs in doubt are those of pixels.
+    """Return readings (k,) with the places that pixels give; what is in doubt is as pixels show.
 
-    IDs need enough certain targets, which tell how well rings are seen in this image.
+    Doubts need enough certain targets, which tell how well rings are seen in this image.
     """
     enough = (_small(rings) & (rings.confidence >= _CERTAIN)).sum() >= _ENOUGH
     least = _POSSIBLE if enough else _PROBABLE
     which = np.flatnonzero(_small(rings) & (rings.of_target >= least))
+    if not len(which):
+        return rings
     which = which[np.argsort(-rings.of_target[which], kind='stable')[:_MOST]]
     own = rings.select(which)
     certain = own.confidence >= _CERTAIN
@@ -66,7 +71,8 @@ def contested(gray: np.ndarray, rings: Aligned, polarity: int, family: CircleFam
         reading = own.select(slice(row, row + 1))
         unusual = scene.usual.unusual(fit)
         if enough and not (certain[row] and unusual <= _UNUSUAL):
-            if unusual < _HOPELESS:
+            doubt = unusual > _UNUSUAL or reading.of_id[0] < _CERTAIN
+            if doubt and unusual < _HOPELESS:
                 reading, fit = scene.likeliest(reading, polarity, fit)
             reading = replace(reading, by_pixels=scene.odds(fit))
         rings = rings.replaced(which[row : row + 1], scene.placed(reading, fit))
@@ -148,12 +154,9 @@ class _Scene:
         """Return the reading of a target, (1,), that pixels show, and its fit.
 
         Of IDs that rays may show, and those that differ in one ring or in all, the likeliest is
-        taken. That is repeated for this one until it stays.
+        taken. That is repeated for this one until it stays. IDs of other families are rivals.
         """
-        fits = {int(rings.ids[0]): fit}
-        rivals = self._rivals(rings, polarity)
-        of_rivals = zip(rivals.ids.tolist(), self._fits(rivals), strict=True)
-        fits |= {number: of for number, of in of_rivals if of}
+        fits = {int(rings.ids[0]): fit} | self._rivals(rings, polarity, fit)
         every = len(self.family.numbers) - 1
         while True:
             best = min(fits, key=lambda it: fits[it].cost(self.usual))
@@ -163,29 +166,32 @@ class _Scene:
                 break
             circles = signed_circles(self.family, np.array(others))
             for other, of in zip(others, circles, strict=True):
-                patch = replace(fits[best].patch, circles=of)
+                patch = replace(fit.patch, circles=of)
                 fits[other] = fitted(patch, fits[best].formed, self.usual)
-        cost, next_cost = sorted(it.cost(self.usual) for it in fits.values())[:2]
-        margin = _OF_MARGIN * (next_cost - cost)
-        return replace(rings, ids=np.array([best]), margin=np.array([margin])), fits[best]
+        fit = fits.pop(best)
+        rivals = list(fits.values())
+        for name in CCTAG_NAMES:
+            if name != self.family.name:
+                scene = replace(self, family=circle_family(name))
+                rivals += scene._rivals(rings, polarity, fit).values()
+        margin = min(rival.cost(self.usual) for rival in rivals) - fit.cost(self.usual)
+        reading = replace(rings, ids=np.array([best]), margin=np.array([_OF_MARGIN * margin]))
+        return reading, fit
 
-    def _rivals(self, rings: Aligned, polarity: int) -> Aligned:
-        """Return readings of a target, (1,), by other IDs that rays may show."""
+    def _rivals(self, rings: Aligned, polarity: int, fit: Fit) -> dict[int, Fit]:
+        """Return fits of a target, (1,), by the IDs that rays may show besides."""
         lights, camera = Lights.about(self.gray, rings.frames), self.usual.camera
-        starts, ids, edges, _ = likely_ids(
-            self.gray, lights, polarity, self.family, camera, _RIVALS
-        )
+        starts, ids, *_ = likely_ids(self.gray, lights, polarity, self.family, camera, _RIVALS)
         numbers, first = np.unique(ids[0], return_index=True)
-        first = first[numbers != rings.ids[0]]
-        shift, blur, sharpening = edges[0, first].T
-        return replace(
-            rings.select(np.zeros(len(first), int)),
-            frames=starts[0, first],
-            ids=ids[0, first],
-            shift=shift,
-            blur=blur,
-            sharpening=sharpening,
-        )
+        larger = frame.mean_radii(starts[0, first]) / frame.mean_radii(rings.frames)
+        begun = frame.scaled(np.repeat(fit.formed.frame[None], len(first), axis=0), larger)
+        circles = signed_circles(self.family, numbers)
+        return {
+            number: fitted(
+                replace(fit.patch, circles=of), replace(fit.formed, frame=start), self.usual
+            )
+            for number, of, start in zip(numbers.tolist(), circles, begun, strict=True)
+        }
 
     def _told(self, rings: Aligned, gamma: float) -> tuple[_Scene, float]:
         """Return what targets tell, and the usual error of gray values.

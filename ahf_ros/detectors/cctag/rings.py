@@ -200,9 +200,15 @@ class Aligned(ArrayRecord):
         return logistic(np.stack(features, axis=1), _OF_TARGET)
 
     @property
+    def of_id(self) -> np.ndarray:
+        """Probability that a target has the ID, shape (k,)."""
+        return logistic(self.margin[:, None], _OF_ID)
+
+    @property
     def confidence(self) -> np.ndarray:
         """Probability that there is a target with the ID, shape (k,)."""
-        return self.of_target * logistic(self.margin[:, None], _OF_ID)
+        confidence: np.ndarray = self.of_target * self.of_id
+        return confidence
 
 
 NOTHING = Aligned(
