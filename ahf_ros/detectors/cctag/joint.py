@@ -86,9 +86,11 @@ def _small(rings: Aligned) -> np.ndarray:
 
 @dataclass(frozen=True, slots=True)
 class _Scene:
-    """An image whose gray values are light, and what is known of its targets."""
+    """An image, its light, and what is known of its targets."""
 
     gray: np.ndarray
+    light: np.ndarray  # of the gray values, whose gamma is the next
+    gamma: float
     known: np.ndarray  # bool, which pixels the camera has not clipped
     family: CircleFamily
     usual: Usual
@@ -99,8 +101,8 @@ class _Scene:
         telling = rings.select(np.argsort(-rings.plain, kind='stable')[:_TELLING])
         known = ~clipped(gray)
         tried = [
-            _Scene(image, known, family, Usual())._told(telling, gamma)
-            for image, gamma in ((gray, 1.0), (as_light(gray), GAMMA))
+            _Scene(gray, light, gamma, known, family, Usual())._told(telling)
+            for light, gamma in ((gray, 1.0), (as_light(gray), GAMMA))
         ]
         return min(tried, key=itemgetter(1))[0]
 
@@ -125,7 +127,7 @@ class _Scene:
         most_shift = MAXIMUM_SHIFT * self.family.narrow
         for row, circles in enumerate(signed_circles(self.family, rings.ids)):
             own, light = (rings.select(slice(row, row + 1)), lights.select(slice(row, row + 1)))
-            patch = Patch.about(self.gray, self.known, own, circles, light, most_shift)
+            patch = Patch.about(self.gray, self.known, own, circles, light, self.gamma, most_shift)
             if len(patch.seen) > _FEWEST:
                 first = self.usual.first(patch.first(own, light))
                 fits.append(fitted(patch, first, self.usual))
@@ -180,8 +182,8 @@ class _Scene:
 
     def _rivals(self, rings: Aligned, polarity: int, fit: Fit) -> dict[int, Fit]:
         """Return fits of a target, (1,), by the IDs that rays may show besides."""
-        lights, camera = Lights.about(self.gray, rings.frames), self.usual.camera
-        starts, ids, *_ = likely_ids(self.gray, lights, polarity, self.family, camera, _RIVALS)
+        lights, camera = Lights.about(self.light, rings.frames), self.usual.camera
+        starts, ids, *_ = likely_ids(self.light, lights, polarity, self.family, camera, _RIVALS)
         numbers, first = np.unique(ids[0], return_index=True)
         larger = frame.mean_radii(starts[0, first]) / frame.mean_radii(rings.frames)
         begun = frame.scaled(np.repeat(fit.formed.frame[None], len(first), axis=0), larger)
@@ -193,26 +195,18 @@ class _Scene:
             for number, of, start in zip(numbers.tolist(), circles, begun, strict=True)
         }
 
-    def _told(self, rings: Aligned, gamma: float) -> tuple[_Scene, float]:
-        """Return what targets tell, and the usual error of gray values.
-
-        The error is that of the image as it was taken, which has a gamma that this one has not.
-        """
+    def _told(self, rings: Aligned) -> tuple[_Scene, float]:
+        """Return what targets tell, and the usual error of gray values."""
         usual = replace(self.usual, camera=Prior.of_camera(self._aligned(rings, Prior())[0]))
         scene = replace(self, usual=usual)
         fits = list(scene.fits(rings).values())
         if not fits:
             return scene, math.inf
-        errors = [
-            np.abs(of.errors)
-            / (gamma * (of.patch.seen / 255).clip(255**-gamma) ** (1 - 1 / gamma))
-            for of in fits
-        ]
-        error = float(np.quantile(np.concatenate(errors), _LARGER))
-        return replace(scene, usual=usual.after(fits)), error
+        errors = np.abs(np.concatenate([of.errors for of in fits]))
+        return replace(scene, usual=usual.after(fits)), float(np.quantile(errors, _LARGER))
 
     def _aligned(self, rings: Aligned, camera: Prior, most: int = EDGES) -> tuple[Aligned, Lights]:
         """Return rings that are brought onto the image, and the lights about them."""
-        lights = Lights.about(self.gray, rings.frames, most)
+        lights = Lights.about(self.light, rings.frames, most)
         edges, family = rings.edges, self.family
-        return align(self.gray, rings.frames, rings.ids, edges, family, camera, lights), lights
+        return align(self.light, rings.frames, rings.ids, edges, family, camera, lights), lights

@@ -1,7 +1,8 @@
 """The pixels about one CCTag, as the rings and the light on it form them.
 
-Sharp light times the sharp print is blurred, so that light and ink mix as in a lens. What is sharp
-has a small blur, with which a few samples a pixel are enough.
+Sharp light times the sharp print is blurred, so that light and ink mix as in a lens. What a camera
+does follows: its gamma, and an unsharp mask. What is sharp has a small blur, with which a few
+samples a pixel are enough.
 """
 
 from __future__ import annotations
@@ -27,7 +28,8 @@ OF_LIGHT = [_CURVATURE, _WIDTH]
 _REACH = 1.25  # radii, up to which pixels are seen
 _FINE = 2  # samples a px along each axis
 _SHARP = 0.3  # blur of what is sharp, px
-_MARGIN = 3  # px about the pixels, that blur mixes with them
+_MARGIN, _OF_MASK = 3, 4  # px about the pixels, that blur and an unsharp mask mix with them
+_DARK = 1e-4  # light, of that on paper, that is black
 _OF_INTERPOLATION = 0.17  # variance that reading between pixels adds to the blur of rays, px^2
 _BLURS = 0.35, 2.0  # px
 _DARKEST = -0.99  # contrast
@@ -104,6 +106,7 @@ class Patch:
     columns: np.ndarray  # distances of pixels from fine points, px, (w, n)
     rows: np.ndarray  # (h, m)
     circles: np.ndarray  # radii as printed, below 0 if paper fills them
+    gamma: float
     sharpening: float
     most_shift: float  # px
 
@@ -114,6 +117,7 @@ class Patch:
         rings: Aligned,
         circles: np.ndarray,
         light: Lights,
+        gamma: float,
         most_shift: float,
     ) -> Patch:
         """Return the pixels about the rings of one target, and in its light.
@@ -122,7 +126,9 @@ class Patch:
         more than `most_shift`, in radii.
         """
         target = rings.frames[0]
+        sharpening = float(rings.sharpening[0])
         reach = math.ceil(_REACH * frame.ellipse_axes(target[None])[0][0]) + 1
+        reach += _OF_MASK if sharpening else 0
         middle = np.rint(target[:2, 2]).astype(int)
         low = np.maximum(middle - reach, 0)
         high = np.minimum(middle + reach + 1, gray.shape[::-1])
@@ -145,7 +151,8 @@ class Patch:
             columns=(x[:, None] - fine_x).astype(np.float32),
             rows=(y[:, None] - fine_y).astype(np.float32),
             circles=circles,
-            sharpening=float(rings.sharpening[0]),
+            gamma=gamma,
+            sharpening=sharpening,
             most_shift=most_shift * float(frame.mean_radii(rings.frames)[0]),
         )
 
@@ -154,7 +161,7 @@ class Patch:
         blur = math.sqrt(max(float(rings.blur[0]) ** 2 - _OF_INTERPOLATION, _BLURS[0] ** 2))
         heights = light.heights[0, 2:]
         edges = light.edges[0, heights != 0]
-        edges[:, _HEIGHT] = heights[heights != 0]
+        edges[:, _HEIGHT] = heights[heights != 0].clip(-_HIGHEST, _HIGHEST)
         wide = (
             usual_widths(np.array(self.light_size)) * np.exp(edges[:, _WIDTH]) * self.light_size
         ) ** 2
@@ -164,14 +171,17 @@ class Patch:
             rings.frames[0], float(rings.shift[0]), blur, 0.0, light.heights[0, :2], edges
         )
         bright, ink = self._light(formed)[0], self._ink(formed)[0]
-        both = self._blurred(np.stack([bright, bright * ink]), blur).T
-        (paper, step), *_ = np.linalg.lstsq(both, self.seen, rcond=None)
-        return replace(formed, contrast=max(float(step / max(paper, 1.0)), _DARKEST))
+        both = self._blurred(np.stack([bright, bright * ink]), blur)[:, self.known].T
+        seen = (self.seen / self.seen.max()) ** self.gamma
+        (paper, step), *_ = np.linalg.lstsq(both, seen, rcond=None)
+        return replace(formed, contrast=max(float(step / max(paper, _DARK)), _DARKEST))
 
     def shown(self, formed: Formed) -> np.ndarray:
-        """Return the pixels that are formed where paper in full light is 1, (n,)."""
+        """Return the gray values that are formed where paper in full light is 1, (n,)."""
         sharp = self._light(formed)[0] * (1 + formed.contrast * self._ink(formed)[0])
-        return self._blurred(sharp[None], formed.blur)[0]
+        light = self._blurred(sharp[None], formed.blur)
+        shown: np.ndarray = self._taken(light)[0]
+        return shown
 
     def derivatives(self, formed: Formed) -> tuple[np.ndarray, np.ndarray]:
         """Return what is `shown`, and its derivatives by all parameters, (p, n)."""
@@ -188,12 +198,13 @@ class Patch:
                 sharp * by_light,
             ]
         )
-        shown, *changed = self._blurred(changes, formed.blur)
+        mixed = self._blurred(changes, formed.blur)
         wider, narrower = (
-            self._blurred(sharp[None], formed.blur * of)[0] for of in (_APART, 1 / _APART)
+            self._blurred(sharp[None], formed.blur * of) for of in (_APART, 1 / _APART)
         )
         by_blur = (wider - narrower) / (2 * math.log(_APART))
-        return shown, np.array([*changed[: SHIFT + 1], by_blur, *changed[SHIFT + 1 :]])
+        shown, *changed = self._taken(np.insert(mixed, SHIFT + 2, by_blur, axis=0))
+        return shown, np.array(changed)
 
     def _ink(self, formed: Formed) -> np.ndarray:
         """Return ink at fine points, and its derivatives by the radius and shift, (3, m, n)."""
@@ -242,20 +253,31 @@ class Patch:
         return np.exp(logarithm), np.stack(changes)
 
     def _blurred(self, sharp: np.ndarray, blur: float) -> np.ndarray:
-        """Return the known pixels, (p, n), of what is sharp at fine points."""
-        blurred = self._mixed(sharp, blur)
-        if self.sharpening:
-            masked = self._mixed(sharp, math.hypot(blur, MASK))
-            blurred = (1 + self.sharpening) * blurred - self.sharpening * masked
-        return blurred[:, self.known]
-
-    def _mixed(self, sharp: np.ndarray, blur: float) -> np.ndarray:
+        """Return the light on pixels, (p, h, w), of what is sharp at fine points."""
         rest = math.sqrt(max(blur**2 - _SHARP**2, 0.01))
-        rows, columns = (np.exp(-0.5 * (of / rest) ** 2) for of in (self.rows, self.columns))
-        rows /= rows.sum(axis=1, keepdims=True)
-        columns /= columns.sum(axis=1, keepdims=True)
-        mixed: np.ndarray = rows @ sharp @ columns.T
-        return mixed
+        return _mixed(sharp, self.rows / rest, self.columns / rest)
+
+    def _taken(self, light: np.ndarray) -> np.ndarray:
+        """Return gray values of known pixels, (p, n), of light and of changes of it, (p, h, w)."""
+        if self.gamma != 1:
+            first = np.maximum(light[0], _DARK)
+            gray = first ** (1 / self.gamma)
+            light = light * (gray / first / self.gamma)
+            light[0] = gray
+        if self.sharpening:
+            y, x = (np.arange(of, dtype=np.float32) / MASK for of in self.known.shape)
+            mask = _mixed(light, y[:, None] - y, x[:, None] - x)
+            light = light + self.sharpening * (light - mask)
+        return light[:, self.known]
+
+
+def _mixed(values: np.ndarray, rows: np.ndarray, columns: np.ndarray) -> np.ndarray:
+    """Return means of values (p, m, n) by normal weights, of deviations (h, m) and (w, n)."""
+    down, across = (np.exp(-0.5 * of**2) for of in (rows, columns))
+    down /= down.sum(axis=1, keepdims=True)
+    across /= across.sum(axis=1, keepdims=True)
+    mixed: np.ndarray = down @ values @ across.T
+    return mixed
 
 
 def _grid(x: np.ndarray, y: np.ndarray) -> np.ndarray:
