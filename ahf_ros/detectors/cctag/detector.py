@@ -21,6 +21,7 @@ from ahf_ros.codes.cctag import CircleFamily, circle_family
 from ahf_ros.detectors.cctag.glance import Glance, likely_rings
 from ahf_ros.detectors.cctag.joint import contested, jointly
 from ahf_ros.detectors.cctag.light import EDGES
+from ahf_ros.detectors.cctag.rays import exposed
 from ahf_ros.detectors.cctag.rings import Aligned, Prior, align, identify, in_light
 from ahf_ros.detectors.claims import best_targets
 from ahf_ros.detectors.contract import FamilyDetector, moved_targets
@@ -85,7 +86,7 @@ class CctagDetector(FamilyDetector):
         be, stay as they are.
         """
         check_image(image)
-        gray = as_gray(image).astype(np.float32, copy=False)
+        gray = exposed(as_gray(image).astype(np.float32, copy=False))
         refined = list(targets)
         for family in self.design:
             known = [it for it in targets if it.id != UNDECODED and it.family == family.name]
@@ -112,9 +113,9 @@ class CctagDetector(FamilyDetector):
 
     def _identify(self, octave: Octave) -> list[Target]:
         """Return the targets of an octave, in its pixels."""
-        gray = octave.pyramid.gray
+        gray = exposed(octave.pyramid.gray)
         found = []
-        glances = [Glance.at(gray, _circles(octave)), *_common_centres(octave)]
+        glances = [Glance.at(gray, _circles(octave)), *_common_centres(octave, gray)]
         for polarity in self.settings.polarities:
             for family in self.design:
                 frames = likely_rings(glances, octave.radii, polarity, family)
@@ -278,7 +279,7 @@ def _circles(octave: Octave) -> Dots:
     return Dots.joined(found)
 
 
-def _common_centres(octave: Octave) -> list[Glance]:
+def _common_centres(octave: Octave, gray: np.ndarray) -> list[Glance]:
     """Return a glance at circles about the points that the edges of many circles face.
 
     Narrow rings are too close for a dot to be told from the next, and blur takes their contrast.
@@ -305,7 +306,7 @@ def _common_centres(octave: Octave) -> list[Glance]:
     size = np.full(len(x), low)
     frames = frame.affine_frames(x, y, size, size, np.zeros(len(x)))
     centres = Dots(frames, np.zeros(len(x), int), np.ones(len(x)))
-    return [Glance.at(octave.pyramid.gray, centres, high / low)]
+    return [Glance.at(gray, centres, high / low)]
 
 
 def _doubled(pyramid: ImagePyramid) -> ImagePyramid:

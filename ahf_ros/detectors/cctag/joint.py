@@ -18,7 +18,6 @@ from ahf_ros.codes.cctag import CircleFamily, circle_family
 from ahf_ros.detectors.cctag.fit import Fit, Usual, fitted
 from ahf_ros.detectors.cctag.light import EDGES, Lights
 from ahf_ros.detectors.cctag.patch import Patch
-from ahf_ros.detectors.cctag.rays import clipped
 from ahf_ros.detectors.cctag.rings import GAMMA, Aligned, Prior, align, as_light, likely_ids
 from ahf_ros.detectors.cctag.templates import MAXIMUM_SHIFT, signed_circles
 from ahf_ros.features import frame
@@ -91,7 +90,6 @@ class _Scene:
     gray: np.ndarray
     light: np.ndarray  # of the gray values, whose gamma is the next
     gamma: float
-    known: np.ndarray  # bool, which pixels the camera has not clipped
     family: CircleFamily
     usual: Usual
 
@@ -99,9 +97,8 @@ class _Scene:
     def of(gray: np.ndarray, rings: Aligned, family: CircleFamily) -> _Scene:
         """Return an image with what the likeliest of targets tell, gamma with it."""
         telling = rings.select(np.argsort(-rings.plain, kind='stable')[:_TELLING])
-        known = ~clipped(gray)
         tried = [
-            _Scene(gray, light, gamma, known, family, Usual())._told(telling)
+            _Scene(gray, light, gamma, family, Usual())._told(telling)
             for light, gamma in ((gray, 1.0), (as_light(gray), GAMMA))
         ]
         return min(tried, key=itemgetter(1))[0]
@@ -127,7 +124,7 @@ class _Scene:
         most_shift = MAXIMUM_SHIFT * self.family.narrow
         for row, circles in enumerate(signed_circles(self.family, rings.ids)):
             own, light = (rings.select(slice(row, row + 1)), lights.select(slice(row, row + 1)))
-            patch = Patch.about(self.gray, self.known, own, circles, light, self.gamma, most_shift)
+            patch = Patch.about(self.gray, own, circles, light, self.gamma, most_shift)
             if len(patch.seen) > _FEWEST:
                 first = self.usual.first(patch.first(own, light))
                 fits.append(fitted(patch, first, self.usual))

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ahf_ros.detectors.cctag.light import Lights, usual_widths
+from ahf_ros.detectors.cctag.rays import clipped
 from ahf_ros.detectors.cctag.rings import Aligned
 from ahf_ros.detectors.cctag.templates import MASK
 from ahf_ros.features import frame
@@ -113,7 +114,6 @@ class Patch:
     @staticmethod
     def about(
         gray: np.ndarray,
-        known: np.ndarray,
         rings: Aligned,
         circles: np.ndarray,
         light: Lights,
@@ -122,8 +122,7 @@ class Patch:
     ) -> Patch:
         """Return the pixels about the rings of one target, and in its light.
 
-        Pixels of an image are `known` unless the camera has clipped them. Ink has not grown by
-        more than `most_shift`, in radii.
+        Ink has not grown by more than `most_shift`, in radii.
         """
         target = rings.frames[0]
         sharpening = float(rings.sharpening[0])
@@ -138,7 +137,7 @@ class Patch:
             np.arange(of[0] - _MARGIN, of[-1] + _MARGIN + 1 / _FINE, 1 / _FINE) for of in (x, y)
         )
         place = _in_plane(target, _grid(x, y))
-        known = (np.hypot(*place) < _REACH) & known[about]
+        known = (np.hypot(*place) < _REACH) & ~clipped(gray[about])
         points = _grid(fine_x, fine_y)
         light_x, light_y = _in_plane(light.frames[0], points)
         return Patch(

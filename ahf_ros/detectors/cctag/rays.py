@@ -28,6 +28,8 @@ _ROUNDS = 2  # of weights
 _ROUNDS_OF_CLIPPED = 4  # in which rays are fitted to what the camera clips
 _CLIPPED = 1.0  # distance of gray values from limits, within which they are clipped
 _LEAST_GAIN = 0.05
+_DRAWN, _BETWEEN = 1e-4, 0.1  # least share of black and of white, most between, in a drawing
+_OF_DRAWING = 40.0, 235.0  # its gray values
 _OTHER_CONTRAST = 0.2  # difference of the contrast of a ray, that quarters its weight
 
 
@@ -138,6 +140,19 @@ def clipped(values: np.ndarray) -> np.ndarray:
     """Return which gray values the camera has clipped."""
     clipped: np.ndarray = (values <= BLACK + _CLIPPED) | (values >= WHITE - _CLIPPED)
     return clipped
+
+
+def exposed(gray: np.ndarray) -> np.ndarray:
+    """Return gray values, which are less than those of a drawing, of which none is clipped.
+
+    No exposure makes paper white and ink black, with little between.
+    """
+    black, white = ((of).mean() for of in (gray <= BLACK + _CLIPPED, gray >= WHITE - _CLIPPED))
+    if min(black, white) < _DRAWN or 1 - black - white > _BETWEEN:
+        return gray
+    low, high = _OF_DRAWING
+    drawn: np.ndarray = gray * np.float32((high - low) / (WHITE - BLACK)) + np.float32(low)
+    return drawn
 
 
 def _as_seen(seen: Seen, model: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
