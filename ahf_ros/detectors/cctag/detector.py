@@ -21,7 +21,7 @@ from ahf_ros.codes.cctag import CircleFamily, circle_family
 from ahf_ros.detectors.cctag.glance import Glance, likely_rings
 from ahf_ros.detectors.cctag.joint import contested, jointly
 from ahf_ros.detectors.cctag.light import EDGES
-from ahf_ros.detectors.cctag.rays import exposed
+from ahf_ros.detectors.cctag.rays import is_drawing, of_drawing
 from ahf_ros.detectors.cctag.rings import Aligned, Prior, align, identify, in_light
 from ahf_ros.detectors.claims import best_targets
 from ahf_ros.detectors.contract import FamilyDetector, moved_targets
@@ -86,7 +86,9 @@ class CctagDetector(FamilyDetector):
         be, stay as they are.
         """
         check_image(image)
-        gray = exposed(as_gray(image).astype(np.float32, copy=False))
+        gray = as_gray(image).astype(np.float32, copy=False)
+        if is_drawing(gray):
+            gray = of_drawing(gray)
         refined = list(targets)
         for family in self.design:
             known = [it for it in targets if it.id != UNDECODED and it.family == family.name]
@@ -113,9 +115,9 @@ class CctagDetector(FamilyDetector):
 
     def _identify(self, octave: Octave) -> list[Target]:
         """Return the targets of an octave, in its pixels."""
-        gray = exposed(octave.pyramid.gray)
+        gray = octave.pyramid.gray
         found = []
-        glances = [Glance.at(gray, _circles(octave)), *_common_centres(octave, gray)]
+        glances = [Glance.at(gray, _circles(octave)), *_common_centres(octave)]
         for polarity in self.settings.polarities:
             for family in self.design:
                 frames = likely_rings(glances, octave.radii, polarity, family)
@@ -279,7 +281,7 @@ def _circles(octave: Octave) -> Dots:
     return Dots.joined(found)
 
 
-def _common_centres(octave: Octave, gray: np.ndarray) -> list[Glance]:
+def _common_centres(octave: Octave) -> list[Glance]:
     """Return a glance at circles about the points that the edges of many circles face.
 
     Narrow rings are too close for a dot to be told from the next, and blur takes their contrast.
@@ -306,11 +308,15 @@ def _common_centres(octave: Octave, gray: np.ndarray) -> list[Glance]:
     size = np.full(len(x), low)
     frames = frame.affine_frames(x, y, size, size, np.zeros(len(x)))
     centres = Dots(frames, np.zeros(len(x), int), np.ones(len(x)))
-    return [Glance.at(gray, centres, high / low)]
+    return [Glance.at(octave.pyramid.gray, centres, high / low)]
 
 
 def _doubled(pyramid: ImagePyramid) -> ImagePyramid:
-    """Return a pyramid with twice the contrast of ln I."""
+    """Return a pyramid with twice the contrast of ln I, whose gray values are not clipped."""
     logs = tuple(_GAIN * log for log in pyramid.logs)
     edges = tuple(find_edges(log) for log in logs[1:])
-    return replace(pyramid, logs=logs, edges=edges, common=None)
+    doubled = replace(pyramid, logs=logs, edges=edges, common=None)
+    if not is_drawing(pyramid.gray):
+        return doubled
+    halves = tuple(of_drawing(half) for half in pyramid.halves)
+    return replace(doubled, gray=of_drawing(pyramid.gray), halves=halves)

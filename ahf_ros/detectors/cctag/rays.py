@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+import cv2
 import numpy as np
 
 from ahf_ros.features import frame
@@ -28,8 +29,9 @@ _ROUNDS = 2  # of weights
 _ROUNDS_OF_CLIPPED = 4  # in which rays are fitted to what the camera clips
 _CLIPPED = 1.0  # distance of gray values from limits, within which they are clipped
 _LEAST_GAIN = 0.05
-_DRAWN, _BETWEEN = 1e-4, 0.1  # least share of black and of white, most between, in a drawing
-_OF_DRAWING = 40.0, 235.0  # its gray values
+_DRAWN, _BETWEEN = 1e-4, 0.2  # least share of black and of white, most between, in a drawing
+_OF_DRAWING = 40.0, 235.0  # its gray values, as a camera sees it
+_BLUR_OF_DRAWING = 0.7  # the same, px
 _OTHER_CONTRAST = 0.2  # difference of the contrast of a ray, that quarters its weight
 
 
@@ -142,17 +144,17 @@ def clipped(values: np.ndarray) -> np.ndarray:
     return clipped
 
 
-def exposed(gray: np.ndarray) -> np.ndarray:
-    """Return gray values, which are less than those of a drawing, of which none is clipped.
+def is_drawing(gray: np.ndarray) -> bool:
+    """Return whether paper is white and ink black, with little between: no exposure does that."""
+    black, white = (gray <= BLACK + _CLIPPED).mean(), (gray >= WHITE - _CLIPPED).mean()
+    return min(black, white) >= _DRAWN and 1 - black - white <= _BETWEEN
 
-    No exposure makes paper white and ink black, with little between.
-    """
-    black, white = ((of).mean() for of in (gray <= BLACK + _CLIPPED, gray >= WHITE - _CLIPPED))
-    if min(black, white) < _DRAWN or 1 - black - white > _BETWEEN:
-        return gray
+
+def of_drawing(gray: np.ndarray) -> np.ndarray:
+    """Return gray values as a camera sees a drawing: none is clipped, and edges are blurred."""
     low, high = _OF_DRAWING
-    drawn: np.ndarray = gray * np.float32((high - low) / (WHITE - BLACK)) + np.float32(low)
-    return drawn
+    values = gray * np.float32((high - low) / (WHITE - BLACK)) + np.float32(low)
+    return cv2.GaussianBlur(values, (0, 0), _BLUR_OF_DRAWING)
 
 
 def _as_seen(seen: Seen, model: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -54,17 +54,7 @@ _TELLING_OF_GAMMA = 16  # targets
 _ENOUGH = 4  # certain targets, that tell of the edges of an image
 _OF_CAMERA = 0.03  # standard deviation of the sharpening of one camera
 _OF_IMAGE = 0.1, 0.1, _OF_CAMERA  # of growth, ln of the blur and sharpening, of an image's targets
-_SCALES = (
-    0.93,
-    0.9475,
-    0.965,
-    0.9825,
-    1.0,
-    1.0175,
-    1.035,
-    1.0525,
-    1.07,
-)  # of the radius, about a frame
+_SCALES = tuple(np.linspace(0.93, 1.07, 9).tolist())  # of the radius, about a frame
 _ALIKE = 0.9  # share of the mean of rays, that some ID explains
 _LIKE_DISCS = 12.0  # px: two discs leave less than rings of so many px, by a factor of e at most
 _READINGS = 5  # IDs that are brought onto the image from a frame
