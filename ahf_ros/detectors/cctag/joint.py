@@ -109,12 +109,12 @@ class _Scene:
         Where the pixels are unlike what is usual, light of fewer edges is tried.
         """
         fits: dict[int, Fit] = {}
-        rows = np.arange(len(rings.ids))
+        rows, worse = np.arange(len(rings.ids)), self.usual.unusual
         for most in range(EDGES, 0, -1):
             for row, fit in zip(rows.tolist(), self._fits(rings.select(rows), most), strict=True):
-                if fit and (row not in fits or fit.cost(self.usual) < fits[row].cost(self.usual)):
+                if fit and (row not in fits or worse(fit) < worse(fits[row])):
                     fits[row] = fit
-            unusual = [row for row, fit in fits.items() if self.usual.unusual(fit) > _UNUSUAL]
+            unusual = [row for row, fit in fits.items() if worse(fit) > _UNUSUAL]
             rows = np.array(unusual, int)
         return fits
 

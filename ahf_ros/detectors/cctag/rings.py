@@ -546,7 +546,7 @@ def _plain(seen: np.ndarray, rings: np.ndarray, good: np.ndarray, blur: np.ndarr
         steps = normal_integral((edges - PROFILE) / blur[index]) * weight
         profile, ink = profile * weight, ink * weight
         profile, ink, steps = (of - (of @ line) @ line.T for of in (profile, ink, steps))
-        total = profile @ profile
+        total = max(profile @ profile, 1e-12)
         steps = steps / np.maximum(np.linalg.norm(steps, axis=1, keepdims=True), 1e-9)
         along, alike = steps @ profile, steps @ steps.T
         both = along[:, None] ** 2 + along**2 - 2 * alike * along[:, None] * along
