@@ -26,9 +26,9 @@ OF_EDGE = 5
 _CURVATURE, _HEIGHT, _WIDTH = 2, 3, 4  # of an edge, after its direction and offset
 OF_LIGHT = [_CURVATURE, _WIDTH]
 """What is alike of all edges of light."""
-_REACH = 1.25  # radii, up to which pixels are seen
+_REACH = 1.35  # radii, up to which pixels are seen
 _FINE = 2  # samples a px along each axis
-_SHARP = 0.3  # blur of what is sharp, px
+_SHARP = 0.2  # blur of what is sharp, px
 _MARGIN, _OF_MASK = 3, 4  # px about the pixels, that blur and an unsharp mask mix with them
 _DARK = 1e-4  # light, of that on paper, that is black
 _OF_INTERPOLATION = 0.17  # variance that reading between pixels adds to the blur of rays, px^2
