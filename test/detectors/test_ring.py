@@ -163,7 +163,9 @@ def test_an_id_is_reported_once_or_not_at_all():
     assert {target.reason for target in contested} == {'contested'}
     assert {target.likely_id for target in contested} <= {it.id for it in rendering.targets}
     told = create_detector('ring').contesting()(twice)
-    assert [(it.id, round(it.x)) for it in told] == [(it.id, round(it.x)) for it in found]
+    # The two of an ID are equally high but for the last bits, which have no order.
+    places = [sorted((it.id, round(it.x)) for it in of) for of in (told, found)]
+    assert places[0] == places[1]
 
 
 @pytest.mark.lasting
