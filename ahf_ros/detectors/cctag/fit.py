@@ -170,40 +170,39 @@ def fitted(patch: Patch, formed: Formed, usual: Usual) -> Fit:
     """Return what forms the pixels of a target, from what nearly does."""
     seen, damping = patch.seen, _DAMPING[0]
     weights = 1 / usual.variances(seen)
+    plain, changes = patch.shown(formed)
     for outlier in _OUTLIERS:
-        plain, changes = patch.derivatives(formed)
         paper = _paper(weights, plain, seen)
-        shown = paper * plain
-        variances = usual.variances(shown)
-        errors = seen - shown
+        errors = seen - paper * plain
+        variances = usual.variances(paper * plain)
         relative = errors / np.sqrt(variances)
         spread = max(NORMAL * float(np.median(np.abs(relative))), _LEAST_SPREAD)
         weights = geman_mcclure(1 / variances, relative / (outlier * spread))
         free = max(float(weights @ variances) - len(changes), _FREE)
-        each = free / max(float(weights @ errors**2), 1e-9)
+        best = float(weights @ errors**2)
+        each = free / max(best, 1e-9)
         columns = np.concatenate([paper * changes, plain[None]])
         normal = each * (columns * weights) @ columns.T
         right = each * columns @ (weights * errors)
         known, towards = usual.prior(patch, formed)
         normal[:-1, :-1] += known
         right[:-1] += towards
-        before, best = formed, float(weights @ errors**2)
+        before = formed, plain, changes
         for _ in range(_TRIALS):
             change = np.linalg.solve(normal + damping * np.diag(np.diag(normal)), right)[:-1]
-            formed = before.changed(change, patch.most_shift)
-            plain = patch.shown(formed)
-            shown = _paper(weights, plain, seen) * plain
-            if float(weights @ (seen - shown) ** 2) <= best * (1 + _DAMPING[1]):
+            formed = before[0].changed(change, patch.most_shift)
+            plain, changes = patch.shown(formed)
+            errors = seen - _paper(weights, plain, seen) * plain
+            if float(weights @ errors**2) <= best * (1 + _DAMPING[1]):
                 damping = max(damping / 5, _DAMPING[1])
                 break
             damping = max(10 * damping, _DAMPING[0])
         else:
-            formed = before
+            formed, plain, _ = before
             break
-        moved = np.hypot(*(formed.frame - before.frame)[:2, 2])
+        moved = np.hypot(*(formed.frame - before[0].frame)[:2, 2])
         if max(moved, *np.abs(change[[SHIFT, BLUR]]) / _BY_PLACE) < _STAYING:
             break
-    plain = patch.shown(formed)
     shown = _paper(weights, plain, seen) * plain
     return Fit(patch, formed, shown, np.linalg.inv(normal)[:-1, :-1])
 

@@ -45,10 +45,11 @@ def jointly(gray: np.ndarray, rings: Aligned, family: CircleFamily) -> Aligned:
     small = np.flatnonzero(_small(rings))
     if not len(small):
         return rings
-    scene = _Scene.of(gray, rings.select(small), family)
-    for row, fit in scene.fits(rings.select(small)).items():
-        which = small[row : row + 1]
-        rings = rings.replaced(which, scene.placed(rings.select(which), fit))
+    own = rings.select(small)
+    scene = _Scene.of(gray, own, family)
+    for row, fit in scene.fits(own).items():
+        placed = scene.placed(own.select(slice(row, row + 1)), fit)
+        rings = rings.replaced(small[row : row + 1], placed)
     return rings
 
 

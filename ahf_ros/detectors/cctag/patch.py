@@ -100,7 +100,7 @@ class Patch:
 
     known: np.ndarray  # bool, whether pixels are of the target and not clipped, (h, w)
     seen: np.ndarray  # gray values of those, (n,)
-    points: np.ndarray  # fine ones, (m, n, 3), homogeneous px
+    points: np.ndarray  # fine ones, px, (m, n, 2)
     light_x: np.ndarray  # the same in the plane of the frame that light is told in, (m, n)
     light_y: np.ndarray
     light_size: float  # radius of that frame, px
@@ -143,9 +143,9 @@ class Patch:
         return Patch(
             known=known,
             seen=gray[about][known].astype(np.float64),
-            points=points.astype(np.float32),
-            light_x=light_x.astype(np.float32),
-            light_y=light_y.astype(np.float32),
+            points=points,
+            light_x=light_x,
+            light_y=light_y,
             light_size=float(frame.mean_radii(light.frames)[0]),
             columns=(x[:, None] - fine_x).astype(np.float32),
             rows=(y[:, None] - fine_y).astype(np.float32),
@@ -169,29 +169,29 @@ class Patch:
         formed = Formed(
             rings.frames[0], float(rings.shift[0]), blur, 0.0, light.heights[0, :2], edges
         )
-        bright, ink = self._light(formed)[0], self._ink(formed)[0]
+        radius = np.hypot(*_in_plane(formed.frame, self.points))
+        bright, ink = self._light(formed)[0], self._ink(radius, formed.shift)[0]
         both = self._blurred(np.stack([bright, bright * ink]), blur)[:, self.known].T
         seen = (self.seen / self.seen.max()) ** self.gamma
         (paper, step), *_ = np.linalg.lstsq(both, seen, rcond=None)
         return replace(formed, contrast=max(float(step / max(paper, _DARK)), _DARKEST))
 
-    def shown(self, formed: Formed) -> np.ndarray:
-        """Return the gray values that are formed where paper in full light is 1, (n,)."""
-        sharp = self._light(formed)[0] * (1 + formed.contrast * self._ink(formed)[0])
-        light = self._blurred(sharp[None], formed.blur)
-        shown: np.ndarray = self._taken(light)[0]
-        return shown
+    def shown(self, formed: Formed) -> tuple[np.ndarray, np.ndarray]:
+        """Return the gray values that are formed where paper in full light is 1, (n,).
 
-    def derivatives(self, formed: Formed) -> tuple[np.ndarray, np.ndarray]:
-        """Return what is `shown`, and its derivatives by all parameters, (p, n)."""
-        ink, by_radius, by_shift = self._ink(formed)
+        The next are their derivatives by all parameters, (p, n).
+        """
+        x, y = _in_plane(formed.frame, self.points)
+        radius = np.hypot(x, y)
+        ink, by_radius, by_shift = self._ink(radius, formed.shift)
         light, by_light = self._light(formed)
         sharp = light * (1 + formed.contrast * ink)
         on_ink = light * formed.contrast
+        outwards = frame.displacement_basis(np.arctan2(y, x).ravel(), radius.ravel())
         changes = np.concatenate(
             [
                 sharp[None],
-                on_ink * by_radius * self._outwards(formed),
+                on_ink * by_radius * outwards.T.reshape(SHIFT, *x.shape),
                 (on_ink * by_shift)[None],
                 (light * ink)[None],
                 sharp * by_light,
@@ -205,14 +205,13 @@ class Patch:
         shown, *changed = self._taken(np.insert(mixed, SHIFT + 2, by_blur, axis=0))
         return shown, np.array(changed)
 
-    def _ink(self, formed: Formed) -> np.ndarray:
+    def _ink(self, radius: np.ndarray, shift: float) -> np.ndarray:
         """Return ink at fine points, and its derivatives by the radius and shift, (3, m, n)."""
-        radius = np.hypot(*_in_plane(formed.frame, self.points))
         scale = 1 / np.maximum(np.hypot(*np.gradient(radius, 1 / _FINE)), 1e-6) / _SHARP
         ink, by_radius, by_shift = seen = np.zeros((3, *radius.shape), np.float32)
         for circle in self.circles.tolist():
             sign = math.copysign(1.0, circle)
-            away = (abs(circle) - radius) * scale + sign * formed.shift / _SHARP
+            away = (abs(circle) - radius) * scale + sign * shift / _SHARP
             density = np.exp(-0.5 * away**2)
             ink += sign * normal_integral(away)
             by_radius += sign * density
@@ -220,12 +219,6 @@ class Patch:
         by_radius *= scale / math.sqrt(2 * math.pi)
         by_shift /= _SHARP * math.sqrt(2 * math.pi)
         return seen
-
-    def _outwards(self, formed: Formed) -> np.ndarray:
-        """Return by how much changes of the frame move fine points outwards, radii, (7, m, n)."""
-        x, y = _in_plane(formed.frame, self.points)
-        basis = frame.displacement_basis(np.arctan2(y, x).ravel(), np.hypot(x, y).ravel())
-        return basis.T.reshape(SHIFT, *x.shape)
 
     def _light(self, formed: Formed) -> tuple[np.ndarray, np.ndarray]:
         """Return light at fine points, and its derivatives as shares of it, (2 + 5 e, m, n)."""
@@ -280,12 +273,11 @@ def _mixed(values: np.ndarray, rows: np.ndarray, columns: np.ndarray) -> np.ndar
 
 
 def _grid(x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Return homogeneous points of a grid, (m, n, 3)."""
-    across, down = np.meshgrid(x, y)
-    return np.stack([across, down, np.ones_like(across)], axis=-1)
+    """Return the points of a grid, (m, n, 2)."""
+    return np.stack(np.meshgrid(x, y), axis=-1)
 
 
 def _in_plane(target: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return x and y, radii, of points (m, n, 3) in the plane of a frame."""
-    x, y, scale = np.moveaxis(points @ np.linalg.inv(target).T.astype(points.dtype), -1, 0)
-    return x / scale, y / scale
+    """Return x and y, radii, float32, of points (m, n, 2) in the plane of a frame."""
+    x, y = np.moveaxis(frame.project(np.linalg.inv(target)[None], points)[0], -1, 0)
+    return x.astype(np.float32), y.astype(np.float32)
