@@ -13,6 +13,9 @@ MINIMUM_SIDE = 16
 SATURATED = 253.0
 """Gray value from which a reading is white, whatever the light."""
 
+GAMMA = 2.2
+"""Gray values are taken to be light to the power of 1 / `GAMMA`, unless they are light."""
+
 IMAGE_TYPES = (np.uint8, np.uint16, np.float32, np.float64)
 """Accepted pixel types, in the byte order of the machine."""
 
@@ -80,6 +83,12 @@ def as_gray(image: np.ndarray) -> np.ndarray:
     kind = np.float64 if image.dtype == np.float64 else np.float32
     share = image / kind(brightest(image))
     return np.minimum(255 * share, 255).astype(np.float32)
+
+
+def as_light(gray: np.ndarray) -> np.ndarray:
+    """Return the light that gray values show, float32, from 0 to 255 as these."""
+    light: np.ndarray = 255 * cv2.pow(np.maximum(gray, 0) / np.float32(255), GAMMA)
+    return light
 
 
 def stretched_to_8_bit(image: np.ndarray) -> np.ndarray:

@@ -16,9 +16,8 @@ import numpy as np
 
 from ahf_ros.imaging import MAXIMUM_IMAGES
 from ahf_ros.imaging.even_light import even_light
-from ahf_ros.imaging.image import brightest, check_image
+from ahf_ros.imaging.image import GAMMA, brightest, check_image
 
-_GAMMA = 2.2  # gray values are taken to be light to the power of 1 / _GAMMA
 _FLOOR = 2 / 255  # of the range; added to both sides of a quotient, about what noise adds
 _STRIP = 64  # rows combined at a time, which stay in the cache of a core
 
@@ -128,8 +127,8 @@ def _largest(images: Sequence[np.ndarray]) -> np.ndarray:
 
 
 def _mean_light(images: Sequence[np.ndarray]) -> np.ndarray:
-    light = sum(cv2.pow(image, _GAMMA) for image in images)
-    return cv2.pow(light / np.float32(len(images)), 1 / _GAMMA)
+    light = sum(cv2.pow(image, GAMMA) for image in images)
+    return cv2.pow(light / np.float32(len(images)), 1 / GAMMA)
 
 
 def _mean_gray(images: Sequence[np.ndarray]) -> np.ndarray:

@@ -12,7 +12,7 @@ from ahf_ros.codes import CCTAG_NAMES
 from ahf_ros.detectors import create_detector
 from ahf_ros.synthetic.scene import Rendering
 from benchmarks.textures import lookalikes, textured_image
-from support.scenes import counted, rendering
+from support.scenes import counted, errors, rendering
 
 SIZE = {'width': 560, 'height': 420, 'targets': 6, 'dot_radius': 14.0, 'seed': 2}
 
@@ -22,12 +22,6 @@ SOFT = {'width': 1000, 'height': 760}
 
 def scene(family: str = 'cctag3', **changes: object) -> Rendering:
     return rendering(**SIZE | {'family': family} | changes)
-
-
-def errors(shown: Rendering, found: list) -> np.ndarray:
-    """Return the errors of the centres of the targets that were found, px, shape (k, 2)."""
-    places = {target.id: (target.x, target.y) for target in shown.targets}
-    return np.array([(it.x - places[it.id][0], it.y - places[it.id][1]) for it in found])
 
 
 @pytest.mark.parametrize(

@@ -41,9 +41,8 @@ from ahf_ros.features.array_record import ArrayRecord
 from ahf_ros.features.logistic import logistic
 from ahf_ros.features.normal import normal_integral
 from ahf_ros.features.robust import NORMAL
+from ahf_ros.imaging.image import as_light
 
-GAMMA = 2.2
-"""Of gray values, unless they are light."""
 _TRIED_SHIFTS = -1.2, -0.6, 0.0, 0.6, 1.2  # deviations
 _TRIED_BLURS, _TRIED_SHARPENINGS = (-1.0, 0.0, 1.4), (3.0, 7.0)  # the same
 _GROWN = (0.85, 0.9, 0.95, 1.0, 1.05)  # radii of the outermost circle, where that was found
@@ -363,12 +362,6 @@ def _shared(seen: Seen) -> np.ndarray:
     means, rays = less_lines(seen.values.mean(axis=1)), less_lines(seen.values)
     shared: np.ndarray = (means**2).sum(axis=1) / (rays**2).sum(axis=2).mean(axis=1)
     return shared
-
-
-def as_light(gray: np.ndarray) -> np.ndarray:
-    """Return the light, up to 255, of gray values that have the usual gamma."""
-    light: np.ndarray = 255 * (gray.clip(0) / 255) ** np.float32(GAMMA)
-    return light
 
 
 def in_light(gray: np.ndarray, rings: Aligned, family: CircleFamily) -> np.ndarray:

@@ -17,7 +17,6 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
 
-import cv2
 import numpy as np
 
 from ahf_ros.blas import one_blas_thread
@@ -35,13 +34,12 @@ from ahf_ros.features.dots import Dots
 from ahf_ros.features.pyramid import image_pyramid, octaves
 from ahf_ros.features.robust import NORMAL, median
 from ahf_ros.features.sampling import sample_circles
-from ahf_ros.imaging.image import as_gray, check_image
+from ahf_ros.imaging.image import as_gray, as_light, check_image
 
 MINIMUM_TARGETS = 5
 """Targets of a family from which it is learnt; twenty tell it well."""
 
-_GAMMA = 2.2  # light is this power of gray values as cameras write them
-_INK_CONTRAST = 0.1  # gray value of ink over that of paper, below which there is no such gamma
+_INK_CONTRAST = 0.1  # gray value of ink over that of paper, below which there is no gamma
 _ANGLES = 480
 _RADII = np.arange(1.05, 5.5, 0.05)  # of circles that are read, dot radii
 _CENTRE = np.arange(0.025, 0.4, 0.025)  # of circles about a pinhole, dot radii
@@ -175,12 +173,6 @@ def _most_circular(in_gray: Bands, in_light: Bands) -> Bands:
     return in_gray.replaced(seen, in_light.select(seen))
 
 
-def _light(gray: np.ndarray) -> np.ndarray:
-    """Return the light that gray values show, float32, from 0 to 255 as these."""
-    light: np.ndarray = 255 * cv2.pow(np.maximum(gray, 0) / np.float32(255), _GAMMA)
-    return light
-
-
 def _fit(image: np.ndarray, dots: Dots | Fit) -> Fit:
     return fit_dots(image, dots.frames, dots.polarity, rays=_RAYS, reach=_REACH)
 
@@ -226,7 +218,7 @@ def _bands(gray: np.ndarray, fit: Fit, index: int) -> tuple[Bands, Bands]:
     in_gray, some = in_gray.select(good), fit.select(good)
     if not good.any():
         return in_gray, in_gray
-    light = _light(gray)
+    light = as_light(gray)
     in_light, good = _measured_in(light, _fit(light, some), index)
     good &= some.contrast > _INK_CONTRAST
     spread, holes = np.where(good, in_light.spread, np.inf), _holes(gray, in_gray)
