@@ -116,8 +116,8 @@ class Evidence(ArrayRecord):
         )
 
 
-def growth_by(shift: float, size: np.ndarray) -> np.ndarray:
-    """Return the growth of dots of radii (k,) by a shift of edges, both px, in dot radii, (k,)."""
+def growth_by(shift: float | np.ndarray, size: np.ndarray) -> np.ndarray:
+    """Return the growth of dots of radii (k,) by shifts of edges, both px, in dot radii, (k,)."""
     return np.clip(shift / size, -_MAXIMUM_GROWTH, _MAXIMUM_GROWTH)
 
 
@@ -161,7 +161,7 @@ def edge_evidence(
     edges = light_edges(polar, radius, growth, inner)
     ground_at = np.stack([inner - before, outer + beside])
     band_at = np.stack([inner + within, outer - within])
-    ground, inside = (np.stack([polar.at(of) for of in at], axis=1) for at in (ground_at, band_at))
+    ground, inside = (polar.at(of).swapaxes(0, 1) for of in (ground_at, band_at))
     # Shares of ink on ground and band, without marks and with them.
     bare = [_blurred(polar, at, -np.inf, radius + growth) for at in (ground_at, band_at)]
     marked = [
@@ -238,9 +238,10 @@ def light_edges(
 ) -> np.ndarray:
     """Return the probabilities of an edge of light between neighbours, as gaps show it, (k,)."""
     start, width = radius + growth, inner - radius - growth
-    near, far = (polar.logs(polar.at(start + part * width)) for part in _ACROSS)
-    noise = np.hypot(near[1], far[1])
-    many = (np.abs(near[0] - far[0]) > np.hypot(LIGHT_EDGE, 2 * noise)).mean(axis=1)
+    across = polar.at(start + np.multiply.outer(_ACROSS, width)).swapaxes(0, 1)
+    level, noise = polar.logs(across)
+    step = np.abs(level[:, 0] - level[:, 1])
+    many = (step**2 > LIGHT_EDGE**2 + 4 * (noise**2).sum(axis=1)).mean(axis=1)
     return np.clip(many, *SURPRISES)
 
 

@@ -161,20 +161,22 @@ def _bounds(
     """Return the same for some numbers of sectors in one band, shape (numbers, k)."""
     angles = _PER_SECTOR * max(bits)
     polar = polar_images(gray, dots, band, angles, _CIRCLES)
-    best = np.full((len(bits), len(dots.frames)), -np.inf)
-    tried = _SHIFTS if band[1] - band[0] >= _WIDE else _OF_NARROW
-    for shift in shifts or np.linspace(-_MAXIMUM_SHIFT, _MAXIMUM_SHIFT, tried).tolist():
-        growth = growth_by(shift, polar.size)
-        edges = edge_evidence(polar, 1 - growth, growth, band)
-        holes = _holes(polar, band_edges(1 - growth, growth, band)[1])
-        cap = _CAP * edges.weight[:, None]
-        for index, count in enumerate(bits):
-            paper, ink = (_of_sectors(of.sum(axis=1), count) for of in (edges.paper, edges.ink))
-            of_word = np.maximum(np.maximum(paper, ink), -_COVER).sum(axis=2)
-            marked = _of_sectors(np.clip((edges.ink - edges.paper).sum(axis=1), -cap, cap), count)
-            bound = np.minimum(of_word, np.maximum(marked, 0).sum(axis=2)).max(axis=1)
-            bound = np.where(holes, -np.inf, bound / (angles * edges.weight))
-            best[index] = np.maximum(best[index], bound)
+    number = _SHIFTS if band[1] - band[0] >= _WIDE else _OF_NARROW
+    tried = shifts or np.linspace(-_MAXIMUM_SHIFT, _MAXIMUM_SHIFT, number)
+    every = polar.repeated(len(tried))
+    growth = growth_by(np.repeat(tried, len(polar.size)), every.size)
+    edges = edge_evidence(every, 1 - growth, growth, band)
+    holes = _holes(every, band_edges(1 - growth, growth, band)[1])
+    cap = _CAP * edges.weight[:, None]
+    marked = np.clip((edges.ink - edges.paper).sum(axis=1), -cap, cap)
+    looks = np.stack([edges.paper.sum(axis=1), edges.ink.sum(axis=1), marked], axis=1)
+    best = np.empty((len(bits), len(dots.frames)))
+    for index, count in enumerate(bits):
+        paper, ink, marked = _of_sectors(looks, count).swapaxes(0, 1)
+        of_word = np.maximum(np.maximum(paper, ink), -_COVER).sum(axis=2)
+        bound = np.minimum(of_word, np.maximum(marked, 0).sum(axis=2)).max(axis=1)
+        bound = np.where(holes, -np.inf, bound / (angles * edges.weight))
+        best[index] = bound.reshape(len(tried), -1).max(axis=0)
     return best
 
 
@@ -183,25 +185,31 @@ def _holes(polar: PolarImages, outer: np.ndarray) -> np.ndarray:
 
     From the radii of the outer edges of the bands, (k,).
     """
+    bright = np.flatnonzero(polar.polarity < 0)
+    holes = np.zeros(len(outer), bool)
+    if not bright.size:
+        return holes
+    polar, outer = polar.select(bright), outer[bright]
     inside, outside = (
-        np.stack([polar.logs(polar.at(radius))[0] for radius in radii], axis=1)
-        for radii in (DOT[:, None] * np.ones_like(outer), outer + MARGIN[:, None])
+        polar.logs(polar.at(radius).swapaxes(0, 1))[0]
+        for radius in (DOT[:, None] * np.ones_like(outer), outer + MARGIN[:, None])
     )
     alike = np.abs(outside - np.median(inside, axis=(1, 2), keepdims=True)) < _ALIKE
-    return np.asarray((polar.polarity < 0) & (alike.mean(axis=2) > _BEYOND).all(axis=1))
+    holes[bright] = (alike.mean(axis=2) > _BEYOND).all(axis=1)
+    return holes
 
 
 def _of_sectors(values: np.ndarray, bits: int) -> np.ndarray:
-    """Return the sums of values (k, m) over sectors at some phases, shape (k, phases, bits)."""
-    count = values.shape[1]
-    sums = np.cumsum(np.concatenate([values, values], axis=1), axis=1, dtype=np.float64)
+    """Return the sums of values (..., m) over sectors at some phases, (..., phases, bits)."""
+    count = values.shape[-1]
+    sums = np.cumsum(np.concatenate([values, values], axis=-1), axis=-1, dtype=np.float64)
     starts = (np.arange(_PHASES)[:, None] / _PHASES + np.arange(bits)) * count / bits
     ends = starts + count / bits
 
     def until(places: np.ndarray) -> np.ndarray:
         """Return the integral from the first value to places, of steps of width 1."""
         below = places.astype(np.intp)
-        before = np.where(below > 0, sums[:, np.maximum(below - 1, 0)], 0.0)
-        return before + (places - below) * (sums[:, below] - before)
+        before = np.where(below > 0, sums[..., np.maximum(below - 1, 0)], 0.0)
+        return before + (places - below) * (sums[..., below] - before)
 
     return until(ends) - until(starts)
