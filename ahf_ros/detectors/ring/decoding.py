@@ -18,7 +18,6 @@ from ahf_ros.detectors.ring.likelihood import SURPRISES, Evidence
 from ahf_ros.features.array_record import ArrayRecord
 from ahf_ros.features.normal import normal_integral
 
-_COVER = 6.0  # price of something that covers a stretch of the band
 _MAXIMUM_READING = 5.0  # for or against a word
 _LIKE_PAPER = 8.5  # the same of something that looks like paper
 _IN_LIGHT = 15.0  # times the probability of edges of light beyond the least, by which that grows
@@ -30,6 +29,9 @@ _NEAR = 3  # angles on either side of the clearest one
 _REFINED = 2  # best words, that compete at the phases beside theirs as well
 _PHASE = 0.5  # error of the phase of sectors, angles
 _NEVER = np.float32(-np.inf)
+
+COVER = 6.0
+"""Price of something that covers a stretch of the band."""
 
 CLEAR = 15.0
 """Log odds of a word against the next ID that leave no doubt of it."""
@@ -117,7 +119,7 @@ def decode(
     `overhang`, shape (k,), is by how many angles ink is longer at either end than its sectors;
     `expected` are IDs that are likely to be there. Empty: all IDs are equally likely.
     """
-    of_bands = _doubted(evidence)
+    of_bands = without_outliers(evidence)
     count, angles = of_bands.paper.shape
     per_sector = angles // family.bits
     cap = _RANKED * of_bands.weight[:, None]
@@ -192,7 +194,7 @@ def decode(
     return decoded.replaced(read, found)
 
 
-def _doubted(evidence: Evidence) -> Evidence:
+def without_outliers(evidence: Evidence) -> Evidence:
     """Return the evidence of whole bands, (k, m), no reading of which counts too much.
 
     Light may do anything at any angle.
@@ -372,7 +374,7 @@ def _covered_paths(seen: np.ndarray, as_paper: np.ndarray, of: Evidence) -> np.n
     for of_angle, of_paper in zip(seen[1:], as_paper[1:], strict=True):
         before = clear
         clear = np.maximum(np.maximum(clear, covered), like_paper) + of_angle
-        covered = np.maximum(covered, before - np.float32(_COVER)) - cost
+        covered = np.maximum(covered, before - np.float32(COVER)) - cost
         like_paper = np.maximum(like_paper, before - price)
         like_paper += of_paper - more
     return np.maximum(np.maximum(clear, covered), like_paper)
@@ -397,7 +399,7 @@ def _backtracked(seen: np.ndarray, as_paper: np.ndarray, of: Evidence) -> np.nda
     """Return the same for bands of which a part is covered."""
     cost = np.float32(_COVERED) * of.weight
     price, more = _like_paper(of)
-    prices = np.stack([0 * cost, np.full_like(cost, _COVER), price])
+    prices = np.stack([0 * cost, np.full_like(cost, COVER), price])
     scores = np.full((3, seen.shape[1]), _NEVER)
     scores[0] = seen[0]
     came = np.zeros((len(seen), 3, seen.shape[1]), np.intp)
@@ -463,7 +465,7 @@ def _free_paths(evidence: Evidence) -> tuple[np.ndarray, np.ndarray]:
     With it comes the number of borders of these arcs, each of which has its price.
     """
     cost = np.float32(_COVERED) * evidence.weight
-    border, cover = _border(evidence), np.float32(_COVER)
+    border, cover = _border(evidence), np.float32(COVER)
     paper, ink = evidence.paper.T, evidence.ink.T
     white, dark = paper[0], ink[0]
     covered = np.full_like(white, _NEVER)
