@@ -13,6 +13,7 @@ edges of any height. Their sum over a target is the log odds of a word against n
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -406,10 +407,10 @@ def _surprise(errors: np.ndarray, width: np.ndarray, which: np.ndarray) -> np.nd
     """Return the probabilities that nothing predicts a level, as ground shows them, (k, 1, 1)."""
     outside = (np.abs(errors) > _UNLIKELY * width) & which
     share = outside.sum(axis=(1, 2)) / np.maximum(which.sum(axis=(1, 2)), 1)
-    return np.clip(share, *SURPRISES)[:, None, None]
+    return np.clip(share, *SURPRISES).astype(np.float32)[:, None, None]
 
 
 def normal(values: np.ndarray, spread: np.ndarray) -> np.ndarray:
     """Return the densities of values under normal distributions about 0."""
-    density: np.ndarray = np.exp(-0.5 * (values / spread) ** 2) / (spread * np.sqrt(2 * np.pi))
+    density: np.ndarray = np.exp(-0.5 * (values / spread) ** 2) / (spread * math.sqrt(2 * math.pi))
     return density

@@ -110,7 +110,7 @@ class PolarImages(ArrayRecord):
         return self.select(np.tile(np.arange(len(self.row)), times))
 
     def at(self, radii: np.ndarray) -> np.ndarray:
-        """Return gray values on a circle of each dot, of radii (..., k) in dot radii, (..., k, m)."""
+        """Return gray values on circles of dots, of radii (..., k) in dot radii, (..., k, m)."""
         spacing = (self.outermost - _INNERMOST) / (self.gray.shape[2] - 1)
         place = np.clip((radii - _INNERMOST) / spacing, 0, self.gray.shape[2] - 1.001)
         below = place.astype(np.intp)
