@@ -86,6 +86,8 @@ def settle_same_prints(hypotheses: Hypotheses, families: Sequence[Family]) -> Hy
     Where two families of an image have a print, it is of the one whose words the other has all, or
     the nearest target that only one of them has tells which it is.
     """
+    if len(families) == 1:
+        return hypotheses
     codes = decoded(hypotheses)[1]
     certain = np.flatnonzero(hypotheses.certain).tolist()
     prints = {

@@ -398,8 +398,8 @@ def _predicted(best: np.ndarray, weight: np.ndarray) -> np.ndarray:
     ahead, behind = np.zeros_like(gain), np.zeros_like(gain)
     count = len(gain)
     for step in range(1 - count, count):
-        ahead[step] = np.clip(ahead[step - 1], -price, 0) + gain[step]
-        behind[-step - 1] = np.clip(behind[-step] + gain[-step], 0, price)
+        ahead[step] = np.minimum(np.maximum(ahead[step - 1], -price), 0) + gain[step]
+        behind[-step - 1] = np.minimum(np.maximum(behind[-step] + gain[-step], 0), price)
     return np.moveaxis(ahead + behind <= 0, 0, 2)
 
 

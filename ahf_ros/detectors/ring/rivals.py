@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 
@@ -102,6 +103,7 @@ def word_ceilings(
     return np.array(ceilings)
 
 
+@cache
 def has_all(code: Family, other: Family) -> bool:
     """Return whether a family has all words of another one, in the same print."""
     same = (code.band, code.bits) == (other.band, other.bits)
