@@ -71,7 +71,7 @@ def main() -> None:
     import numpy as np
 
     from ahf_ros import create_identifier
-    from benchmarks.calls import calls_of
+    from support.calls import calls_of
 
     cv2.setNumThreads(1)
     warm: set[str] = set()
