@@ -8,11 +8,16 @@ import numpy as np
 import pytest
 
 from support.calls import IMAGES, RECORD, TOLERANCE, calls_for, calls_of
+from support.square_markers import needs_square_markers
 
 RECORDED = json.loads(RECORD.read_text())
+SQUARE = {name for name in IMAGES if name.startswith(('aruco', 'apriltag', 'auto'))}
 
 
-@pytest.mark.parametrize('name', IMAGES)
+@pytest.mark.parametrize(
+    'name',
+    [pytest.param(it, marks=needs_square_markers) if it in SQUARE else it for it in IMAGES],
+)
 def test_an_image_takes_as_many_calls_as_recorded(name: str) -> None:
     calls, targets = calls_for(name)
     before = RECORDED[name]
