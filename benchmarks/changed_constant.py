@@ -17,41 +17,69 @@ from functools import partial
 from importlib.machinery import SourceFileLoader
 from pathlib import Path
 from types import CodeType
-from typing import Any
+from typing import Any, TypeAlias
+
+Scope: TypeAlias = ast.Module | ast.ClassDef | ast.FunctionDef
 
 
-def change(constant: str, value: float) -> None:
-    """Change a constant of a module that is not imported yet; ValueError if it has none.
+def change(place: str, expression: str) -> None:
+    """Change a name of a module that is not imported yet; ValueError if it has none.
 
     Parameters
     ----------
-    constant : str
-        Name of the module, a dot, and that of the constant.
-    value : float
+    place : str
+        Name of the module, a dot, and that of the constant or function. After a colon instead of
+        the dot, the name may lie in functions or classes: `module:function.local`.
+    expression : str
+        What the name is assigned instead, Python.
     """
-    module, _, name = constant.rpartition('.')
+    module, _, name = place.rpartition(':' if ':' in place else '.')
     compiled = SourceFileLoader.get_code
 
     def get_code(loader: SourceFileLoader, fullname: str) -> CodeType | None:
         if fullname != module:
             return compiled(loader, fullname)
         tree = ast.parse(loader.get_data(loader.path))
-        replace = assigned(tree).get(name)
-        if replace is None:
-            raise ValueError(f'{module} has no constant {name}')
-        replace(value)
+        try:
+            replace(tree, name, expression)
+        except KeyError:
+            raise ValueError(f'{module} has no constant {name}') from None
         return compile(ast.fix_missing_locations(tree), loader.path, 'exec')
 
     SourceFileLoader.get_code = get_code  # type: ignore[method-assign]
 
 
-def assigned(tree: ast.Module) -> dict[str, Callable[[float], None]]:
+def replace(tree: ast.Module, name: str, expression: str) -> None:
+    """Let what a name stands for be an expression instead; KeyError if there is no such name.
+
+    The name is that of `change`. A function becomes the assignment of the expression.
+    """
+    *scopes, last = name.split('.')
+    scope: Scope = tree
+    for outer in scopes:
+        scope = definitions(scope)[outer]
+    value = ast.parse(expression, mode='eval').body
+    defined = definitions(scope).get(last)
+    if defined is not None:
+        assignment = ast.Assign([ast.Name(last, ast.Store())], value)
+        scope.body[scope.body.index(defined)] = assignment
+    else:
+        assigned(scope)[last](value)
+
+
+def definitions(scope: Scope) -> dict[str, ast.FunctionDef | ast.ClassDef]:
+    """Return the functions and classes of a module, a class or a function."""
+    kinds = (ast.FunctionDef, ast.ClassDef)
+    return {node.name: node for node in scope.body if isinstance(node, kinds)}
+
+
+def assigned(scope: Scope) -> dict[str, Callable[[ast.expr], None]]:
     """Return the names that a module assigns to, and for each what replaces its value.
 
     A name may be alone on the left, or one of as many names as there are values on the right.
     """
-    found: dict[str, Callable[[float], None]] = {}
-    for node in tree.body:
+    found: dict[str, Callable[[ast.expr], None]] = {}
+    for node in scope.body:
         if isinstance(node, ast.AnnAssign) and node.value is not None:
             targets, value = [node.target], node.value
         elif isinstance(node, ast.Assign):
@@ -70,14 +98,14 @@ def assigned(tree: ast.Module) -> dict[str, Callable[[float], None]]:
     return found
 
 
-def replace_value(node: ast.Assign | ast.AnnAssign, value: float) -> None:
-    """Let a statement assign a number."""
-    node.value = ast.Constant(value)
+def replace_value(node: ast.Assign | ast.AnnAssign, value: ast.expr) -> None:
+    """Let a statement assign another value."""
+    node.value = value
 
 
-def replace_element(values: ast.Tuple, number: int, value: float) -> None:
-    """Let a number be one of several values."""
-    values.elts[number] = ast.Constant(value)
+def replace_element(values: ast.Tuple, number: int, value: ast.expr) -> None:
+    """Let one of several values be another one."""
+    values.elts[number] = value
 
 
 def results(folder: Path) -> dict[str, Any]:
@@ -113,7 +141,7 @@ def main() -> None:
     options = parser.parse_args()
     if options.change:
         constant, value = options.change
-        change(constant, float(value))
+        change(constant, value)
     found = results(options.folder)
     if options.change and constant.rpartition('.')[0] not in sys.modules:
         raise SystemExit(f'{constant} is not in a module that the detector imports')

@@ -66,6 +66,7 @@ _SPREAD = 1.4  # votes in a cell and beside it, in weighted votes, at the least
 _OWN = 1 / 8  # of the weighted votes of a peak, that its own cell has
 _WEIGHTS = (0.5, 1.0, 0.5)  # of votes for the cell before, for a cell itself, and the next one
 _OUTSIDE = cv2.BORDER_CONSTANT  # no votes are there
+_MOST_VOTES = 2**24  # that are counted at a time, which bounds the memory
 _FLAT = 1e-6  # curvature of votes from which their top is computed
 
 
@@ -160,34 +161,49 @@ def _peaks(
     reach = max(1, round(_REACH * low / of.cell))
     margin = reach + ceil(high / of.cell) + 1  # votes may lie outside of the image
     tall, wide = (side // of.cell + 1 + 2 * margin for side in edges.marked.shape)
-    # Votes for each polarity and direction are counted in a plane of their own.
-    columns, rows = _votes(edges, of, np.outer(polarities, steps), margin, tall)
-    planes = len(polarities) * of.directions
-    peaks = find_peaks(columns, rows, (planes, tall, wide), needed / of.every, reach)
+    directions = np.pi * np.arange(of.directions) / of.directions
+    at_once = max(1, _MOST_VOTES // (count * len(edges.x) // of.every))  # planes
+    together = at_once >= len(polarities) * of.directions
+    found = []
+    for first, signs in enumerate([polarities] if together else [[it] for it in polarities]):
+        for start in range(0, of.directions, at_once):
+            # Votes for each polarity and direction are counted in a plane of their own.
+            some = directions[start : start + at_once]
+            votes = _votes(edges, of, some, np.outer(signs, steps), margin, tall)
+            shape = len(signs) * len(some), tall, wide
+            peaks = find_peaks(*votes, shape, needed / of.every, reach)
+            del votes  # before the next ones, of large images
+            found.append(replace(peaks, plane=first + peaks.plane // len(some)))
+    peaks = Peaks.joined(found)
     x, y = ((at - margin + 0.5) * of.cell - 0.5 for at in (peaks.x, peaks.y))
-    return replace(peaks, x=x, y=y, plane=peaks.plane // of.directions)
+    return replace(peaks, x=x, y=y)
 
 
 def _votes(
-    edges: LogEdges, of: _Shape, radii: np.ndarray, margin: int, tall: int
+    edges: LogEdges,
+    of: _Shape,
+    directions: np.ndarray,
+    radii: np.ndarray,
+    margin: int,
+    tall: int,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the columns and rows of the cells that edges vote for, int32, shape (n,) both.
 
-    Radii of shape (k, n) are signed, to vote for k polarities. A plane has `tall` rows, with a
-    margin of so many cells about the image.
+    Radii of shape (k, n) are signed, to vote for k polarities, with ellipses in some directions.
+    A plane has `tall` rows, with a margin of so many cells about the image.
     """
     columns, rows = [], []
     cell = np.float32(of.cell)
     some = edges.select(slice(None, None, of.every))
     x, y = ((at + np.float32(0.5)) / cell + np.float32(margin) for at in (some.x, some.y))
     steps = (radii / of.cell).astype(np.float32)[..., None]
-    for number, angle in enumerate(np.pi * np.arange(of.directions) / of.directions):
+    for number, angle in enumerate(directions):
         start_x, start_y, unit_x, unit_y = x, y, some.unit_x, some.unit_y
         if of.aspect < 1:
             which, unit_x, unit_y = _towards_centres(some, of.aspect, angle)
             start_x, start_y = x[which], y[which]
         for polarity, moves in enumerate(steps):
-            top = np.int32((polarity * of.directions + number) * tall)
+            top = np.int32((polarity * len(directions) + number) * tall)
             columns.append((start_x - moves * unit_x).astype(np.int32).ravel())
             rows.append((start_y - moves * unit_y).astype(np.int32).ravel() + top)
     return np.concatenate(columns), np.concatenate(rows)

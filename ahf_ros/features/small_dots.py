@@ -7,6 +7,7 @@ along. In even light they need none.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from functools import partial
 
 import cv2
@@ -14,7 +15,7 @@ import numpy as np
 
 from ahf_ros.features.common_search import BLOBS, dots_in_common
 from ahf_ros.features.dots import NO_DOTS, Dots, best
-from ahf_ros.features.frame import affine_frames
+from ahf_ros.features.frame import affine_frames, translated
 from ahf_ros.features.log_edges import LOG_SCALE
 from ahf_ros.features.pyramid import ImagePyramid
 
@@ -25,7 +26,7 @@ BLURRED = 0.8
 """Radius of a blob whose edge is blurred, in radii of the smallest dot."""
 
 MAXIMUM_BLOBS = 20_000
-"""Small dots kept at the most, those with the highest contrast."""
+"""Small dots kept at the most of a strip, those with the highest contrast."""
 
 _LN_RANGE = 3.6  # of ln(I + 8) for gray values of 8 bit
 _MINIMUM_STEP = 0.2  # of ln, from the ground to the dot
@@ -37,6 +38,7 @@ _BLUR = 0.15  # px^2, variance that blur adds to a dot that is cut off at half o
 _MINIMUM_MINOR = 0.6  # px
 _MINIMUM_PIXELS = 4
 _FILLED = (0.7, 1.35)  # pixels of a dot over the area of its ellipse
+_STRIP = 2**24  # pixels looked at at a time, which bounds the memory
 _TILE = 32  # side of a tile, px; empty tiles are left out
 _MAXIMUM_TILES = 0.3  # of the image; where there are more, it is looked at as a whole
 
@@ -78,7 +80,7 @@ def small_dots(
     reduced = cv2.resize(eight_bit, size, interpolation=cv2.INTER_AREA)
     side = 2 * int(np.ceil(max_radius / _REDUCTION)) + 3
     kernel = np.ones((side, side), np.uint8)
-    found = []
+    found: list[Dots] = []
     for polarity in polarities:
         operation = cv2.MORPH_CLOSE if polarity > 0 else cv2.MORPH_OPEN
         ground = cv2.morphologyEx(reduced, operation, kernel)
@@ -86,8 +88,25 @@ def small_dots(
         steps = cv2.subtract(*((ground, eight_bit) if polarity > 0 else (eight_bit, ground)))
         for outline in explained:
             cv2.fillConvexPoly(steps, np.rint(outline).astype(np.int32), 0)
-        found.append(_blobs(steps, min_radius, max_radius, polarity))
+        found += _blobs_of_strips(steps, min_radius, max_radius, polarity)
     return Dots.joined(found)
+
+
+def _blobs_of_strips(
+    height: np.ndarray, min_radius: float, max_radius: float, polarity: int
+) -> Iterator[Dots]:
+    """Yield the blobs of an image of steps, some rows at a time where it is large.
+
+    Strips overlap by the longest blob, so that each blob is whole in the strip of its centre.
+    """
+    margin = int(2 * max_radius + 3) + 2 * _REACH
+    rows = max(_STRIP // height.shape[1], 2 * margin)
+    for top in range(0, len(height), rows):
+        first = max(top - margin, 0)
+        dots = _blobs(height[first : top + rows + margin], min_radius, max_radius, polarity)
+        dots = replace(dots, frames=translated(dots.frames, 0, first)) if first else dots
+        y = dots.frames[:, 1, 2]
+        yield dots.select((y >= top - 0.5) & (y < top + rows - 0.5))
 
 
 def _blobs(height: np.ndarray, min_radius: float, max_radius: float, polarity: int) -> Dots:

@@ -141,12 +141,22 @@ class Trials:
             return []
         if chosen is None and image.dtype == np.uint8:
             return self._detector(image)
-        with self._lock:
-            if number not in self._prepared:
-                self._prepared[number] = HomomorphicFilter(image, self._settings.filter)
         # equal gains leave the image as it is, but for the mapping to 8 bit
         used = asdict(tuned(image.shape, chosen or (1.0, 1.0)))
-        return self._draft(self._prepared[number].filtered(**used, executor=executor))
+        prepared = self._filter(number, image, keep=chosen is not None)
+        shown = prepared.filtered(**used, executor=executor)
+        del prepared  # while the detector is at work, in large images
+        return self._draft(shown)
+
+    def _filter(self, number: int, image: np.ndarray, *, keep: bool) -> HomomorphicFilter:
+        """Return the filter of an image, which others of a search keep."""
+        with self._lock:
+            prepared = self._prepared.get(number)
+            if prepared is None:
+                prepared = HomomorphicFilter(image, self._settings.filter)
+                if keep:
+                    self._prepared[number] = prepared
+            return prepared
 
 
 def confirmed(

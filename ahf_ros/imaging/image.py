@@ -23,6 +23,7 @@ _MAXIMUM_SIDE = 32767  # px; OpenCV resamples no larger image
 _MAXIMUM_PIXELS = 2**28  # a filter takes some 30 bytes for each
 _HOT_SHARE = 100_000  # one pixel in so many may be brighter than any light in the image
 _MUCH_WHITE = 0.3  # share of an image
+_ROWS = 64  # that are scaled at a time, so that large images need no copies
 
 
 def check_image(image: Any, name: str = 'image') -> None:
@@ -81,8 +82,10 @@ def as_gray(image: np.ndarray) -> np.ndarray:
     if image.dtype == np.uint8:
         return image
     kind = np.float64 if image.dtype == np.float64 else np.float32
-    share = image / kind(brightest(image))
-    return np.minimum(255 * share, 255).astype(np.float32)
+    light, gray = kind(brightest(image)), np.empty(image.shape, np.float32)
+    for top in range(0, len(image), _ROWS):
+        gray[top : top + _ROWS] = np.minimum(255 * (image[top : top + _ROWS] / light), 255)
+    return gray
 
 
 def as_light(gray: np.ndarray) -> np.ndarray:

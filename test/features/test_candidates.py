@@ -110,3 +110,13 @@ def test_peaks_of_two_planes_do_not_touch():
 def test_of_neighbours_the_highest_is_kept():
     cells = np.array([10 * 60 + 10, 10 * 60 + 12, 10 * 60 + 15])
     assert highest(cells, np.array([2.0, 3.0, 1.0]), (40, 60), 2).tolist() == [False, True, True]
+
+
+def test_votes_of_large_images_are_counted_in_parts(monkeypatch: pytest.MonkeyPatch) -> None:
+    dots = [(80.0, 80.0, 12.0), (200.0, 90.0, 20.0, 9.0, 0.5), (120.0, 180.0, 5.0)]
+    gray = in_stripes(drawn(dots), 31, 0.4)
+    whole = voted(gray, (1, -1))
+    monkeypatch.setattr(candidates, '_MOST_VOTES', 1)
+    parts = voted(gray, (1, -1))
+    for one, other in zip(whole, parts, strict=True):
+        assert np.array_equal(np.sort(one, axis=0), np.sort(other, axis=0))

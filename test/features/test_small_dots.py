@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from ahf_ros.features import small_dots as module
 from ahf_ros.features.frame import ellipse_axes
 from ahf_ros.features.log_edges import LOG_SCALE
 from ahf_ros.features.pyramid import log_image
@@ -33,3 +34,15 @@ def test_lines_corners_and_flat_ground_are_no_dots() -> None:
     image[80:, 100:] = 60
     assert not len(small_dots(log_image(image), 1.5, 8.0, (1, -1), LOG_SCALE).frames)
     assert not len(small_dots(log_image(image[:30]), 1.5, 8.0, (1, -1), LOG_SCALE).frames)
+
+
+def test_strips_of_large_images_show_the_same_dots(monkeypatch: pytest.MonkeyPatch) -> None:
+    generator = np.random.default_rng(3)
+    places = [(x, y) for x in range(20, 300, 24) for y in range(20, 600, 24)]
+    dots = [(*(place + generator.uniform(-6, 6, 2)), 3.0, 2.0, 0.3) for place in places]
+    log = log_image(drawn(dots, 200, 50, shape=(600, 300)))
+    whole = small_dots(log, 1.5, 8.0, (1, -1), LOG_SCALE)
+    monkeypatch.setattr(module, '_STRIP', 300 * 40)
+    parts = small_dots(log, 1.5, 8.0, (1, -1), LOG_SCALE)
+    assert len(whole.frames) >= len(dots)
+    assert np.allclose(*(np.sort(of.frames[:, :2, 2], axis=0) for of in (whole, parts)))

@@ -1,0 +1,139 @@
+"""A gate is found where it is, opened, and judged by what it loses and saves."""
+
+from __future__ import annotations
+
+import ast
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ahf_ros.synthetic.scene import SceneSettings, render
+from ahf_ros.target import Target
+from benchmarks import gates
+from benchmarks.changed_constant import replace
+from benchmarks.gate_list import GATES, Gate
+from benchmarks.gates import Difference, Picture, Seen, difference, row, seen, value_of, written
+from benchmarks.opened_gate import verdicts
+
+CLOSED = Gate('every word', 'detectors.ring.hypotheses:CERTAIN', '1.1')
+NO_MATTER = Gate('blobs of few pixels', 'features.small_dots:_MINIMUM_PIXELS', '1')
+SCENE = SceneSettings(width=480, height=320, targets=3, dot_radius=9.0)
+
+
+@pytest.fixture(scope='module')
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp('gates')
+
+
+@pytest.fixture(scope='module')
+def named(folder: Path) -> dict[str, Picture]:
+    shown = render(SCENE)
+    truth = tuple((str(it.id), it.x, it.y) for it in shown.targets)
+    return written([Picture('scene', shown.image, truth, 'metashape12')], folder)
+
+
+@pytest.mark.parametrize('detector', GATES)
+def test_every_gate_is_there_and_no_two_are_the_same(detector: str) -> None:
+    for gate in GATES[detector]:
+        assert value_of(gate.place) != gate.opened, gate
+        compile(gate.opened, gate.place, 'eval')
+    assert len({(it.place, it.opened) for it in GATES[detector]}) == len(GATES[detector])
+    assert len({it.about for it in GATES[detector]}) == len(GATES[detector])
+
+
+def test_a_gate_that_drops_all_targets_loses_them(folder: Path, named: dict[str, Picture]) -> None:
+    # As if the gate was closed in the sources.
+    closed, opened = seen(folder, CLOSED), seen(folder)
+    made = difference(closed, opened, named)
+    assert (made.targets, made.gained, made.lost, made.bad) == (3, 3, 0, 0)
+    assert made.loses and made.pictures == ['scene']
+    cells = row(CLOSED, made, 1, 1)
+    assert cells[:6] == (
+        'every word',
+        '`detectors.ring.hypotheses:CERTAIN`',
+        '`0.75`',
+        '`1.1`',
+        '3',
+        '0',
+    )
+    assert 'loses' in cells[-1]
+
+
+def test_a_gate_at_which_nothing_happens_saves_nothing(
+    folder: Path, named: dict[str, Picture]
+) -> None:
+    made = difference(seen(folder), seen(folder, NO_MATTER), named)
+    assert (made.gained, made.lost, made.bad) == (0, 0, 0)
+    assert made.saves_nothing and not made.loses
+
+
+def test_a_detector_that_an_open_gate_breaks_has_no_pictures(
+    folder: Path, named: dict[str, Picture], capfd: pytest.CaptureFixture[str]
+) -> None:
+    broken = Gate('all', 'features.dot_search:whole_dots', 'None')
+    assert seen(folder, broken) == {}
+    assert 'not callable' in capfd.readouterr().err
+    assert 'does not work open' in row(broken, difference({}, {}, named), 0, 1)[-1]
+
+
+def test_names_lie_in_modules_functions_and_tuples() -> None:
+    assert value_of('features.ellipses:_MINIMUM_STEP') == '0.1'
+    assert value_of('features.ellipses:_INLIER') == '0.06'  # one of two in a line
+    assert value_of('detectors.ring.contests:resolve') == 'a function'
+    assert value_of('detectors.ring.contests:resolve.kept') == 'owners(len(ids), on_it)'
+    for missing in (
+        'features.ellipses:_NO',
+        'features.no:_MINIMUM_STEP',
+        'features.ellipses:no.a',
+    ):
+        with pytest.raises(KeyError):
+            value_of(missing)
+
+
+def test_an_expression_stands_for_a_constant_a_function_or_a_part_of_one() -> None:
+    source = 'A, B = 1, 2\ndef f(x):\n    good = x > A\n    return good\ndef g():\n    return B\n'
+    tree = ast.parse(source)
+    for name, expression in (('B', '5'), ('f.good', 'x'), ('g', 'lambda: A + B')):
+        replace(tree, name, expression)
+    made: dict = {}
+    tree = ast.fix_missing_locations(tree)
+    exec(compile(tree, 'made', 'exec'), made)
+    assert (made['f'](0), made['g']()) == (0, 6)
+
+
+def test_reports_are_judged_as_the_yardstick_does() -> None:
+    place = dict(semi_major=1.0, semi_minor=1.0, angle=0.0, confidence=1.0)
+    found = [
+        Target(id=1, code=9, x=0.0, y=3.0, **place),
+        Target(id=1, code=9, x=0.0, y=4.0, **place),  # again
+        Target(id=2, code=8, x=50.0, y=50.0, **place),  # of another one
+        Target(id=3, code=7, x=90.0, y=90.0, **place),  # where there is none
+        Target(id=-1, code=0, x=95.0, y=90.0, **place),
+    ]
+    truth = (('1', 0.0, 0.0), ('7', 50.0, 52.0), ('code 6', 200.0, 0.0))
+    assert verdicts(found, truth) == ({0}, 2, 1)
+    assert verdicts(found, (('code 9', None, None), ('2', None, None))) == ({0, 1}, 0, 2)
+
+
+def test_pictures_are_chosen_by_a_part_of_their_names() -> None:
+    assert gates.chosen('yardstick r10_stripe.png', [])
+    assert gates.chosen('yardstick r10_stripe.png', ['phone', 'r10'])
+    assert not gates.chosen('yardstick r10_stripe.png', ['phone'])
+    some = gates.pictures('gsi', [1], Path('nowhere'), ['rendered gsi 6 normal'])
+    assert [it.name for it in some] == ['rendered gsi 6 normal 1']
+    assert {gates.kind_of_detector(it) for it in ('aruco_4x4_50', 'apriltag_36h11')} == {'square'}
+
+
+def test_two_in_a_thousand_may_die() -> None:
+    assert not Difference(targets=1000, gained=2).loses
+    assert Difference(targets=1000, gained=3).loses
+    assert not Difference(calls=90, more=100).saves_nothing
+    assert not Difference(calls=100, more=100, bad=1).saves_nothing
+
+
+def test_only_pictures_that_were_done_in_time_count() -> None:
+    both = {name: Seen(frozenset([0]), 0, 0, 10, 1.0) for name in ('a', 'b')}
+    of = Picture('', np.zeros((1, 1)), (('1', 0.0, 0.0),), 'metashape12')
+    made = difference(both, {'a': both['a']}, {'a': of, 'b': of})
+    assert (made.targets, made.calls, made.more) == (1, 10, 10)
