@@ -30,7 +30,8 @@ class ArrayRecord:
 
     def select(self: _Record, which: np.ndarray | slice) -> _Record:
         """Return the rows of an index array, a mask of shape (k,) or a slice."""
-        return type(self)(*[column[which] for column in _columns(tuple(self.__dataclass_fields__))(self)])
+        columns = _columns(tuple(self.__dataclass_fields__))(self)
+        return type(self)(*[column[which] for column in columns])
 
     def replaced(self: _Record, which: np.ndarray, rows: _Record) -> _Record:
         """Return a copy whose rows in an index array or a mask are replaced by `rows`."""
