@@ -25,7 +25,7 @@ from ahf_ros.features.circle_fit import Fit
 
 _FIRST = 8  # doubtful words that rivals read first
 _MORE_SEEN = 6.0  # log odds against anything, by which a family that is not read beats one that is
-_ENOUGH = 0.95  # bound of a rival in the evidence of a word; dots alone do not place it exactly
+_BELOW, _SHARE_BELOW = 5.0, 0.05  # bound below the evidence of a word, as dots alone place bands
 _ANGLES = 240  # of polar images that all numbers of sectors share
 _PHASES = 12  # of sectors, within one of them
 _PARTS = 2  # of a sector, each of which may be covered
@@ -62,9 +62,10 @@ def _beaten(
     beaten = np.zeros(len(words.words), bool)
     for band in dict.fromkeys(code.band for code in rivals):
         of_band = [code for code in rivals if code.band == band]
+        least = words.seen - np.minimum(_BELOW, _SHARE_BELOW * words.seen)
         ceilings = word_ceilings(gray, dots, band, [code.bits for code in of_band], prior)
         for code, ceiling in zip(of_band, ceilings, strict=True):
-            asked = np.flatnonzero((ceiling > _ENOUGH * words.seen) & ~beaten)
+            asked = np.flatnonzero((ceiling > least) & ~beaten)
             if not asked.size:
                 continue
             other, word = read_bands(gray, dots.select(asked), code, prior), words.select(asked)
