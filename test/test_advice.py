@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+import sys
+from collections.abc import Callable
 from dataclasses import replace
 
 import cv2
@@ -110,6 +112,56 @@ def test_a_filter_is_advised_where_it_may_show_more() -> None:
     (line,) = advice(image, settings)  # as if no band had been read
     assert line.startswith('12 dots with a band of 12 sectors are hard to read: give --expected-')
     assert advice(image, settings, expected_targets=12) == []
+
+
+def calls_of(work: Callable[[], object]) -> int:
+    count = 0
+
+    def counted(_frame: object, event: str, _argument: object) -> None:
+        nonlocal count
+        count += event in ('call', 'c_call')
+
+    sys.setprofile(counted)
+    try:
+        work()
+    finally:
+        sys.setprofile(None)
+    return count
+
+
+def spots(across: int, down: int, radius: float) -> np.ndarray:
+    image = np.full((960, 1280), 30, np.uint8)
+    for y in (np.arange(down) + 0.5) * 960 / down:
+        for x in (np.arange(across) + 0.5) * 1280 / across:
+            centre = round(16 * x), round(16 * y)
+            cv2.circle(image, centre, round(16 * radius), 200, -1, cv2.LINE_AA, 4)
+    return cv2.GaussianBlur(image, (0, 0), 1)
+
+
+def texture() -> np.ndarray:
+    noise = np.random.default_rng(1).normal(size=(1000, 1200))
+    soft = cv2.GaussianBlur(noise, (0, 0), 1.5)
+    return np.clip(120 + 45 * soft / soft.std(), 0, 255).astype(np.uint8)
+
+
+@pytest.mark.parametrize('family', ['metashape12', 'auto'])
+@pytest.mark.parametrize('image', [spots(30, 22, 11), spots(100, 75, 4), texture()])
+def test_a_second_look_costs_little_where_nothing_is_a_target(
+    image: np.ndarray, family: str
+) -> None:
+    settings = DetectorSettings(family=family)
+    advice(image[:200, :200], settings)  # modules are imported, tables made
+    given: list[str] = []
+    assert calls_of(lambda: given.extend(advice(image, settings))) < 120_000
+    assert given == []
+
+
+def test_a_second_look_is_at_the_part_with_the_most_dots() -> None:
+    image = np.full((3000, 4000), 220, np.uint8)
+    targets = shown(family='cct10')
+    image[2300:2900, 3100:3900] = targets
+    (line,) = advice(image, DetectorSettings())
+    assert re.match(r'1[12] dots with a band of 10 sectors: --family cct10', line)
 
 
 def finish(adviser: Adviser) -> None:

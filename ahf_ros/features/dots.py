@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
@@ -11,10 +10,10 @@ import numpy as np
 
 from ahf_ros.features import frame
 from ahf_ros.features.array_record import ArrayRecord
+from ahf_ros.notices import tell_left_out
 
 _SAME = 0.3  # largest distance of the centres of the same dot in its radius; of radii in ln
 _PART = 100_000  # pairs looked at at a time, which bounds the memory
-_LOG = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,7 +58,7 @@ def best(indices: np.ndarray, ranks: np.ndarray, limit: int, what: str) -> np.nd
     """
     if len(indices) <= limit:
         return indices
-    _LOG.warning('%d %s; the %d best are looked at', len(indices), what, limit)
+    tell_left_out(len(indices), what, limit)
     return np.sort(indices[np.argsort(ranks, kind='stable')[:limit]])
 
 

@@ -33,6 +33,7 @@ from ahf_ros.filtering.genetic import SearchResult, Values, search
 from ahf_ros.filtering.settings import AdaptiveSettings
 from ahf_ros.filtering.trials import DetectorFunction, Trials, confirmed, fused
 from ahf_ros.imaging.stack import ImageStack
+from ahf_ros.notices import said_once
 from ahf_ros.target import (
     UNDECODED,
     FilterState,
@@ -204,6 +205,7 @@ class Identifier:
 
     @deprecated_arguments(positions=('expected_targets',))
     @one_blas_thread()
+    @said_once()
     def identify(
         self, image: np.ndarray | ImageStack, *, expected_targets: int | None = None
     ) -> Identification:

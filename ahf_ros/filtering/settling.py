@@ -19,6 +19,7 @@ from ahf_ros.deprecation import deprecated_arguments
 from ahf_ros.filtering.identifier import Identifier, Memory
 from ahf_ros.filtering.trials import DetectorFunction, Trials
 from ahf_ros.imaging.stack import ImageStack
+from ahf_ros.notices import said_once
 from ahf_ros.target import UNDECODED, Identification, Target
 
 FIRST = 3
@@ -121,6 +122,7 @@ class SettlingIdentifier(Identifier):
 
     @deprecated_arguments(positions=('expected_targets',))
     @one_blas_thread()
+    @said_once()
     def identify(
         self, image: np.ndarray | ImageStack, *, expected_targets: int | None = None
     ) -> Identification:
