@@ -33,7 +33,7 @@ unexport AMENT_PREFIX_PATH CMAKE_PREFIX_PATH LD_LIBRARY_PATH PYTHONPATH
 unexport _ROS_WHEELS_BOOTSTRAP_COMPLETE
 
 .PHONY: demo nodes test lint site test-native test-live test-commands test-computing test-detectors \
-	test-oldest test-portable test-kilted test-colcon browser clean
+	test-oldest test-portable test-kilted test-colcon yardstick browser clean
 .DELETE_ON_ERROR:
 
 demo: $(INSTALLED)
@@ -42,7 +42,8 @@ demo: $(INSTALLED)
 nodes: $(NODES)
 
 # The longest first, and none so long that it ends alone: two cores end at the same time.
-test: test-live test-oldest test-detectors test-commands test-computing site lint test-portable
+test: test-live test-oldest yardstick test-detectors test-commands test-computing site lint \
+	test-portable
 
 lint: $(READY)
 	$(BIN)/ruff check .
@@ -71,6 +72,18 @@ test-detectors: $(READY)
 
 test-computing: $(READY) | $(if $(CI),browser)
 	$(BIN)/python -m pytest $(patsubst %,--ignore %,$(LIVE) $(COMMANDS) $(DETECTORS))
+
+# Pictures that this package did not render, beside the checkout: no change reads less of them,
+# reports more that is wrong or false, or makes more calls than the record. With UPDATE=1 what is
+# better goes into the record.
+YARDSTICK := ../shared/yardstick/score.py
+
+yardstick: $(READY)
+ifneq ($(wildcard $(YARDSTICK)),)
+	$(BIN)/python $(YARDSTICK) --record benchmarks/yardstick.json $(if $(UPDATE),--update)
+else
+	@echo 'No pictures are at $(YARDSTICK): the yardstick is left out.'
+endif
 
 # Reports are tested in Chromium. CI installs it where it can; elsewhere the test skips without it.
 browser:

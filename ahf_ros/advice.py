@@ -1,6 +1,8 @@
 """What may help where no target is identified: only what a second look at the image measures.
 
-It takes a few identifications, so nothing here is on the way to a result.
+It is a look at the part of the image with the most dots, so that its time and memory are bounded.
+Targets are looked for where the dots are few. Where they are many, as in texture, text and arrays
+of spots, only the bands of the clearest ones are looked at.
 """
 
 from __future__ import annotations
@@ -11,6 +13,7 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
+from math import ceil
 from statistics import median
 
 import cv2
@@ -21,10 +24,19 @@ from ahf_ros.codes.families import AUTO, families_of
 from ahf_ros.codes.ring import FAMILY_NAMES, Family, family, words_of_print
 from ahf_ros.detectors import Contesting, create_detector
 from ahf_ros.detectors.contract import DetectorSettings
-from ahf_ros.detectors.ring.learning import LearntFamily, find_bands, learn_families
+from ahf_ros.detectors.ring.learning import (
+    DotsOfOctave,
+    LearntFamily,
+    bands_about,
+    dots_in,
+    learn_families,
+)
 from ahf_ros.doubt import repeated_remark
 from ahf_ros.edge_shift import edge_shift_remark, median_edge_shift
+from ahf_ros.features.dot_search import whole_dots
+from ahf_ros.features.pyramid import MAXIMUM_RADIUS, image_pyramid
 from ahf_ros.filtering.settling import evident, still_shown
+from ahf_ros.imaging.image import as_gray, check_image
 from ahf_ros.target import UNDECODED, Target, repeated_targets
 from ahf_ros.text import counted
 
@@ -35,7 +47,12 @@ IN_A_ROW = 5
 """Images of a stream without a target, after which one of them gets a second look."""
 
 _ENLARGED = 2  # times, where targets may be too small
-_MAXIMUM_PIXELS = 2**23  # of an image that is enlarged; the middle of a larger one is
+_MAXIMUM_PIXELS = 2**20  # of what is looked at: a part of a larger image
+_MAXIMUM_ENLARGED = 2**19  # the same, of what is enlarged
+_PLACED = 2**22  # pixels of the image in which the part is chosen, at the most
+_TILE = 64  # of that image, whose dots are counted, px
+_CLEAREST = 64  # dots whose bands are looked at
+_FEW, _SPARSE = 120, 0.1  # dots, and share of edge pixels, up to which targets are looked for
 _AMPLE = 1.25  # times the minimum radius, which even light needs
 _SURE = 10.0  # log odds of the number of sectors
 _MISPLACED = 1.5  # px, growth of ink that leaves a doubt of the radii of a band
@@ -54,7 +71,9 @@ def advice(image: np.ndarray, settings: DetectorSettings, expected_targets: int 
     >>> advice(render(scene).image, DetectorSettings(family='metashape12'))
     ['3 targets of aicon14: --family aicon14']
     """
-    return list(filter(None, _lines(image, settings, expected_targets)))
+    check_image(image)
+    part = _with_most_dots(as_gray(image), _MAXIMUM_PIXELS, settings)
+    return list(filter(None, _lines(part, settings, expected_targets)))
 
 
 class Adviser:
@@ -88,17 +107,15 @@ class Adviser:
 
 
 def _lines(image: np.ndarray, settings: DetectorSettings, expected: int) -> Iterator[str]:
-    read: list[Target] = []
-    with suppress(ValueError):  # which the identification has said
-        detector = create_detector(settings=settings)
-        if isinstance(detector, Contesting):
-            detector = detector.contesting()
-        read = detector(image)
+    dots = dots_in(image, DetectorSettings())
+    few = _are_few(dots)
+    read = _read(image, settings) if few else []
     if repeated := repeated_targets(read):
         yield repeated_remark(repeated)
         return
-    if learnt := _learnt(image):
+    if learnt := _learnt(dots):
         yield from _of_bands(learnt, 1, settings, expected)
+    if learnt or not few:
         return
     if settings.family == AUTO and (likely := _likely(read)):
         ((name, count),) = Counter(target.family for target in likely).most_common(1)
@@ -116,8 +133,9 @@ def _lines(image: np.ndarray, settings: DetectorSettings, expected: int) -> Iter
     if shared := list(_of_shared_prints(image, settings)):
         yield from shared
         return
-    middle = _enlarged_middle(image)
-    if learnt := _learnt(middle):
+    middle = _with_most_dots(image, _MAXIMUM_ENLARGED, settings)
+    middle = cv2.resize(middle, None, fx=_ENLARGED, fy=_ENLARGED, interpolation=cv2.INTER_CUBIC)
+    if learnt := _learnt(dots_in(middle, DetectorSettings())):
         yield from _of_bands(learnt, _ENLARGED, settings, expected)
     elif small := _identified(middle, replace(settings, max_radius=_largest_told(settings))):
         radius = median(target.semi_major for target in small) / _ENLARGED
@@ -152,9 +170,16 @@ def _of_shared_prints(image: np.ndarray, settings: DetectorSettings) -> Iterator
             yield f'{counted(count, "target")} of {" or ".join(names)}: --family says which'
 
 
-def _learnt(image: np.ndarray) -> LearntFamily | None:
+def _are_few(dots: list[DotsOfOctave]) -> bool:
+    """Return whether an image has so few dots and edges that targets may be looked for."""
+    marked = [octave.pyramid.edges[0] for octave, _ in dots]
+    many = any(len(edges.x) > _SPARSE * edges.marked.size for edges in marked)
+    return not many and sum(len(of.frames) for _, each in dots for of in each) <= _FEW
+
+
+def _learnt(dots: list[DotsOfOctave]) -> LearntFamily | None:
     """Return the family of most dots with a band, if its number of sectors is sure."""
-    families = learn_families(find_bands([image], DetectorSettings()))
+    families = learn_families(bands_about([dots], _CLEAREST))
     return families[0] if families and families[0].lead > _SURE else None
 
 
@@ -193,14 +218,39 @@ def _of_size(count: int, radius: float, settings: DetectorSettings) -> str:
     return f'{count} dots have a radius of {radius:.1f} px, {name}_radius is {bound:g}'
 
 
+def _read(image: np.ndarray, settings: DetectorSettings) -> list[Target]:
+    """Return the targets that are identified, also those that share an ID."""
+    with suppress(ValueError):  # which the identification has said
+        detector = create_detector(settings=settings)
+        return (detector.contesting() if isinstance(detector, Contesting) else detector)(image)
+    return []
+
+
 def _identified(image: np.ndarray, settings: DetectorSettings) -> list[Target]:
     """Return the targets that the usual detector of some families identifies."""
     detector = create_detector(settings=replace(settings, report_undecoded=False))
     return [target for target in detector(image) if target.id != UNDECODED]
 
 
-def _enlarged_middle(image: np.ndarray) -> np.ndarray:
-    cut = max(0.0, 1 - (_MAXIMUM_PIXELS / image.size) ** 0.5) / 2
-    top, left = (round(cut * side) for side in image.shape)
-    part = image[top : len(image) - top, left : image.shape[1] - left]
-    return cv2.resize(part, None, fx=_ENLARGED, fy=_ENLARGED, interpolation=cv2.INTER_CUBIC)
+def _with_most_dots(image: np.ndarray, most: int, settings: DetectorSettings) -> np.ndarray:
+    """Return the part of an image, of so many pixels at the most, that has the most whole dots."""
+    if image.size <= most:
+        return image
+    times = max(1, ceil((image.size / _PLACED) ** 0.5))
+    reduced = cv2.resize(image, None, fx=1 / times, fy=1 / times, interpolation=cv2.INTER_AREA)
+    pyramid = image_pyramid(reduced, settings.max_radius / times)
+    found = whole_dots(pyramid, 2.0, MAXIMUM_RADIUS, (1, -1)).frames[:, :2, 2]
+    share = (most / image.size) ** 0.5
+    height, width = (max(int(side * share), 1) for side in image.shape)
+    tiles = np.zeros([side // _TILE + 1 for side in reduced.shape], np.float32)
+    np.add.at(tiles, tuple((found[:, ::-1] // _TILE).astype(int).clip(0).T), 1)
+    window = [max(round(side / times / _TILE), 1) for side in (width, height)]
+    within = cv2.boxFilter(tiles, -1, window, normalize=False, borderType=cv2.BORDER_CONSTANT)
+    middle = (np.array(np.unravel_index(within.argmax(), within.shape)) + 0.5) * _TILE * times
+    if not within.any():
+        middle = np.array(image.shape) / 2
+    top, left = (
+        int(np.clip(at - side / 2, 0, whole - side))
+        for at, side, whole in zip(middle, (height, width), image.shape, strict=True)
+    )
+    return np.ascontiguousarray(image[top : top + height, left : left + width])

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cache
+from operator import attrgetter
 from typing import TypeVar
 
 import numpy as np
@@ -28,19 +30,25 @@ class ArrayRecord:
 
     def select(self: _Record, which: np.ndarray | slice) -> _Record:
         """Return the rows of an index array, a mask of shape (k,) or a slice."""
-        return type(self)(*(getattr(self, item.name)[which] for item in fields(self)))
+        columns = _columns(tuple(self.__dataclass_fields__))(self)
+        return type(self)(*[column[which] for column in columns])
 
     def replaced(self: _Record, which: np.ndarray, rows: _Record) -> _Record:
         """Return a copy whose rows in an index array or a mask are replaced by `rows`."""
-        columns = []
-        for item in fields(self):
-            column = getattr(self, item.name).copy()
-            column[which] = getattr(rows, item.name)
-            columns.append(column)
+        of = _columns(tuple(self.__dataclass_fields__))
+        columns = [column.copy() for column in of(self)]
+        for column, new in zip(columns, of(rows), strict=True):
+            column[which] = new
         return type(self)(*columns)
 
     @classmethod
     def joined(cls: type[_Record], parts: Sequence[_Record]) -> _Record:
         """Return the rows of at least one record, one after the other."""
-        names = [item.name for item in fields(cls)]
-        return cls(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
+        columns = zip(*map(_columns(tuple(cls.__dataclass_fields__)), parts), strict=True)
+        return cls(*[np.concatenate(of) for of in columns])
+
+
+@cache
+def _columns(names: tuple[str, ...]) -> Callable[[ArrayRecord], tuple[np.ndarray, ...]]:
+    """Return what reads the columns of some names of a record, at least two."""
+    return attrgetter(*names)

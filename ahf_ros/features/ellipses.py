@@ -28,9 +28,9 @@ _MINIMUM_SCORE = 0.15  # mean step of ln along the ellipse
 _SMALL = 8.0  # largest radius of a range of the first level that is fitted in the image, px
 _OVERSIZE = 1.6  # semi-major axis of a dot, in the largest radius of its range, at the most
 _WINDOWS = (  # about the ellipse, in its own radius; share of inliers; one of so many rays
-    (0.5, 0.35, 2),
-    (0.3, 0.45, 1),
-    (0.15, 0.55, 1),
+    (0.5, 0.25, 2),
+    (0.3, 0.3, 1),
+    (0.15, 0.35, 1),
 )
 _MINIMUM_WINDOW, _MAXIMUM_WINDOW = 2.0, 0.5  # the same: px, and in its own radius
 _PROFILE, _SAMPLES = 1.15, 13  # half length of a profile across it, in windows, and its samples

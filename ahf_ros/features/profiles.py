@@ -12,10 +12,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cache
 from itertools import pairwise
-from math import erf, pi, sqrt
+from math import pi, sqrt
 
 import numpy as np
 
+from ahf_ros.features.normal import exact_normal_integral
 from ahf_ros.features.sampling import sample_lines, within
 
 USUAL_BLUR = 0.8
@@ -121,7 +122,7 @@ def _fit_steps(values: np.ndarray, groups: np.ndarray) -> np.ndarray:
     kinds = groups * _OFFSETS + best
     order = np.argsort(kinds, kind='stable')
     ordered, kinds = values[order], kinds[order]
-    parameters = np.empty((len(values), _SAMPLES), np.float32)
+    parameters = np.empty((len(values), 5 + _SAMPLES), np.float32)
     known = np.empty((3, len(values)))
     bounds = np.flatnonzero(np.diff(kinds, prepend=-1, append=-1))
     for start, end in pairwise(bounds):
@@ -144,7 +145,7 @@ def _fit_steps(values: np.ndarray, groups: np.ndarray) -> np.ndarray:
 @dataclass(frozen=True, slots=True)
 class _StepFilters:
     search: np.ndarray  # (samples, 3 p), two that explain a step at each offset, its contrast
-    parts: np.ndarray  # (p, samples, samples), low, high, moved, slope, blur, residuals
+    parts: np.ndarray  # (p, samples, 5 + samples), low, high, moved, slope, blur, residuals
     known: np.ndarray  # (3, p), offsets, their spacing, how a slope of the light moves steps, px^2
 
 
@@ -178,15 +179,18 @@ def _step_filters(group: int) -> _StepFilters:
     offsets = half * np.linspace(-_MAXIMUM_OFFSET, _MAXIMUM_OFFSET, _OFFSETS)
     away = along - offsets[:, None]
     scaled = away / blur
-    rise = 0.5 * (1 + np.vectorize(erf)(scaled / sqrt(2)))
+    rise = exact_normal_integral(scaled)
     density = np.exp(-0.5 * scaled**2) / (blur * sqrt(2 * pi))
     light = away * (_CONTRAST + (1 - _CONTRAST) * rise)
     design = np.stack([1 - rise, rise, density, light, scaled * density], axis=2)
-    step = np.linalg.pinv(design[..., :3])
-    slope, softness = np.linalg.pinv(design[..., :4])[:, 3:], np.linalg.pinv(design)[:, 4:]
-    bases = np.stack([np.linalg.qr(of, mode='complete')[0].T for of in design])
-    rest = bases[:, design.shape[2] :]
-    search = np.concatenate([bases[:, :2], step[:, 1:2] - step[:, :1]], axis=1)
+    step, whole = np.linalg.pinv(design[..., :3]), np.linalg.pinv(design)
+    slope, softness = np.linalg.pinv(design[..., :4])[:, 3:], whole[:, 4:]
+    rest = np.eye(_SAMPLES) - design @ whole
+    first = design[..., 0] / np.sqrt((design[..., 0] ** 2).sum(axis=1, keepdims=True))
+    second = rise - (first * rise).sum(axis=1, keepdims=True) * first
+    second /= np.sqrt((second**2).sum(axis=1, keepdims=True))
+    bases = np.stack([first, second], axis=1)
+    search = np.concatenate([bases, step[:, 1:2] - step[:, :1]], axis=1)
     parts = np.concatenate([step, slope, softness, rest], axis=1).swapaxes(1, 2)
     sensitivity = -(light * step[:, 2]).sum(axis=1) / (1 - _CONTRAST)
     return _StepFilters(

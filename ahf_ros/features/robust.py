@@ -29,7 +29,7 @@ def median(values: np.ndarray, selected: np.ndarray, empty: float = 1.0) -> np.n
     """
     count = selected.sum(axis=1)
     ordered = np.sort(np.where(selected, values, np.inf), axis=1)
-    middle = np.take_along_axis(ordered, np.maximum(count - 1, 0)[:, None] // 2, axis=1)[:, 0]
+    middle = ordered[np.arange(len(count)), np.maximum(count - 1, 0) // 2]
     return np.where(count > 0, middle, empty)
 
 

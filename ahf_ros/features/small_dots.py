@@ -112,7 +112,8 @@ def _blobs_of_strips(
 def _blobs(height: np.ndarray, min_radius: float, max_radius: float, polarity: int) -> Dots:
     """Return the blobs of an image of steps that have the shape of a dot."""
     least = _MINIMUM_STEP / _LN_RANGE * 255
-    x, y, size = _connected(height, least, _LEVELS[polarity], 2 * max_radius + 3)
+    most = 2 * max_radius + 3
+    x, y, size = _connected(height, least, _LEVELS[polarity], most)
     if not len(size):
         return NO_DOTS
     start = np.cumsum(size) - size
@@ -133,7 +134,7 @@ def _blobs(height: np.ndarray, min_radius: float, max_radius: float, polarity: i
     filled = size / np.maximum(ellipse, 1e-9)
     major = 2 * np.sqrt(np.maximum(middle + half - _BLUR, 0))
     minor = 2 * np.sqrt(np.maximum(middle - half - _BLUR, (_MINIMUM_MINOR / 2) ** 2))
-    good = (longest >= 2 * min_radius - 2) & (peak >= least)
+    good = (longest >= 2 * min_radius - 2) & (longest <= most) & (peak >= least)
     good &= (major >= min_radius) & (major <= max_radius)
     good &= (filled < _FILLED[1]) & (filled > _FILLED[0])
     which = best(np.flatnonzero(good), -peak[good].astype(float), MAXIMUM_BLOBS, 'small dots')
@@ -144,9 +145,12 @@ def _blobs(height: np.ndarray, min_radius: float, max_radius: float, polarity: i
 def _connected(
     height: np.ndarray, least: float, share: float, longest: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return columns and rows of the pixels of small blobs, one by one, and how many each has."""
+    """Return columns and rows of the pixels of blobs, one by one, and how many each has.
+
+    None has more pixels than a blob of a length, px; those of more length may be among them.
+    """
     none = np.zeros(0, np.int32)
-    found = [(none, none, none)]
+    found: list[tuple[np.ndarray, ...]] = [(none, none, none)]
     for top, left, part, own in _parts(height, least):
         level = cv2.convertScaleAbs(
             np.maximum(cv2.dilate(part, _NEAR), np.uint8(least)), alpha=share
@@ -154,20 +158,18 @@ def _connected(
         mask = cv2.compare(part, level, cv2.CMP_GT)
         if own is not None:
             mask = cv2.bitwise_and(mask, own)
-        # The default algorithm of OpenCV 4.5 crashes on large images with this connectivity.
-        _, labels, stats, _ = cv2.connectedComponentsWithStatsWithAlgorithm(
-            mask, 4, cv2.CV_32S, cv2.CCL_SAUF
-        )
-        extent = stats[:, cv2.CC_STAT_WIDTH : cv2.CC_STAT_HEIGHT + 1].max(axis=1)
-        small = (extent <= longest) & (stats[:, cv2.CC_STAT_AREA] >= _MINIMUM_PIXELS)
-        small[0] = False
         if not mask.any():
             continue
+        # The default algorithm of OpenCV 4.5 crashes on large images with this connectivity.
+        count, labels = cv2.connectedComponentsWithAlgorithm(mask, 4, cv2.CV_32S, cv2.CCL_SAUF)
         x, y = cv2.findNonZero(mask).reshape(-1, 2).T
         label = labels[y, x]
-        of_small = np.flatnonzero(small.take(label))
-        order = of_small[np.argsort(label[of_small], kind='stable')]
-        found.append((x[order] + left, y[order] + top, stats[small, cv2.CC_STAT_AREA]))
+        area = np.bincount(label, minlength=count)
+        # A blob of more pixels is longer. How long the others are is measured on what is left.
+        usable = (area >= _MINIMUM_PIXELS) & (area <= longest**2)
+        of_usable = np.flatnonzero(usable.take(label))
+        order = of_usable[np.argsort(label[of_usable], kind='stable')]
+        found.append((x[order] + left, y[order] + top, area[usable]))
     x, y, size = (np.concatenate(column) for column in zip(*found, strict=True))
     return x, y, size
 

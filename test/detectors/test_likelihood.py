@@ -51,6 +51,7 @@ def polar(
     lit = np.broadcast_to(np.asarray(light, float), ANGLES)[:, None]
     return PolarImages(
         gray=np.where(dark, contrast * lit, lit).astype(np.float32)[None],
+        row=np.zeros(1, int),
         reach=np.full((1, ANGLES), np.inf),
         outermost=np.array([OUTERMOST]),
         polarity=np.array([polarity]),

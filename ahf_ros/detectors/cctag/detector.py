@@ -22,7 +22,7 @@ from ahf_ros.detectors.cctag.glance import Glance, likely_rings
 from ahf_ros.detectors.cctag.joint import contested, jointly
 from ahf_ros.detectors.cctag.light import EDGES
 from ahf_ros.detectors.cctag.rays import is_drawing, of_drawing
-from ahf_ros.detectors.cctag.rings import Aligned, Prior, align, identify, in_light
+from ahf_ros.detectors.cctag.rings import NOTHING, Aligned, Prior, align, identify, in_light
 from ahf_ros.detectors.claims import best_targets
 from ahf_ros.detectors.contract import FamilyDetector, moved_targets
 from ahf_ros.features import frame
@@ -47,6 +47,7 @@ _CLEAR_OF_RIVALS = 19.0  # odds of the place of an ID against all others
 _SURE = 0.999  # confidence of targets that neither rivals nor another family put in doubt
 _PROBABLE = 0.5  # confidence of targets that tell of edges together
 _POSSIBLE = 0.01  # probability of a target, from which it is read again
+_IN_A_ROW = 32  # likely frames without a target, which hardly any others precede
 _CERTAIN = 0.75  # confidence from which a target is reported
 _SURE_OF_TARGET = 0.9  # probability of a target, from which it is reported without its ID
 _PLAUSIBLE = 0.6  # share of rays that agree, of a target that is measured again
@@ -148,7 +149,8 @@ def _identified(
     A first reading knows one edge of light. Where it shows likely targets, all are read with more,
     and doubtful ones with what certain ones show.
     """
-    rings = identify(gray, frames, polarity, family, most=1)
+    rings, count = _first_readings(gray, frames, polarity, family)
+    frames = frames[:count]
     possible = rings.select(rings.of_target >= _POSSIBLE)
     if not len(possible.ids):
         return possible, gray
@@ -173,6 +175,23 @@ def _identified(
     again = _readings(light, doubtful[_alone(doubtful, certain.frames)], polarity, family, prior)
     rings = _best(_renewed(rings, again), prior)
     return rings, light
+
+
+def _first_readings(
+    gray: np.ndarray, frames: np.ndarray, polarity: int, family: CircleFamily
+) -> tuple[Aligned, int]:
+    """Return readings in light of one edge at the most, and how many frames were looked at.
+
+    Those that are most like rings come first, and with them the targets. Where none of so many in
+    a row may be one, the others are texture.
+    """
+    found = [NOTHING]
+    for start in range(0, len(frames), _IN_A_ROW):
+        some = frames[start : start + _IN_A_ROW]
+        found.append(identify(gray, some, polarity, family, most=1))
+        if not (found[-1].of_target >= _POSSIBLE).any():
+            return Aligned.joined(found), start + len(some)
+    return Aligned.joined(found), len(frames)
 
 
 def _readings(

@@ -157,10 +157,12 @@ def likely_rings(
     frames, better = (np.concatenate(of) for of in zip(*found, strict=True))
     size, centres = frame.mean_radii(frames), frames[:, :2, 2]
     kept: list[int] = []
+    free = np.ones(len(size), bool)
     for index in np.argsort(-better, kind='stable').tolist():
         if len(kept) == _LOOKED_AT * len(family.numbers):
             break
-        away = np.hypot(*(centres[kept] - centres[index]).T)
-        if not (away < _APART * np.maximum(size[kept], size[index])).any():
+        if free[index]:
+            away = np.hypot(*(centres - centres[index]).T)
+            free &= away >= _APART * np.maximum(size, size[index])
             kept.append(index)
     return frames[kept]

@@ -72,7 +72,7 @@ class Lights(ArrayRecord):
         """Return the light at angles (m,) and radii (n,) of frames, float32, shape (k, m, n)."""
         there = np.linalg.inv(self.frames) @ frames
         points = frame.project(there, frame.circle_points(angles, radii)).astype(np.float32)
-        x, y = (of[:, None] for of in np.moveaxis(points, -1, 0))
+        x, y = points[:, None, ..., 0], points[:, None, ..., 1]
         heights = self.heights.astype(np.float32)[..., None, None]
         light = heights[:, 0] * x[:, 0] + heights[:, 1] * y[:, 0]
         size = frame.mean_radii(self.frames)
@@ -81,9 +81,7 @@ class Lights(ArrayRecord):
             edge = self.edges[some, number : number + 1]
             step = _steps(edge, x[some], y[some], usual_widths(size[some]))[:, 0]
             light[some] += heights[some, 2 + number] * step
-        slope = np.empty((len(light), len(radii)))
-        for own, known in zip(slope, self.slope, strict=True):
-            own[:] = np.interp(radii, _RADII, known)
+        slope = _interpolated(self.slope, radii)
         light += _mixed(light, slope, _LENS / size, radii[1] - radii[0])
         return np.exp(light.clip(-_MOST_LIGHT, _MOST_LIGHT))
 
@@ -294,7 +292,8 @@ def _first_edges(size: int) -> tuple[np.ndarray, np.ndarray]:
 
 def _columns(edges: np.ndarray) -> tuple[np.ndarray, ...]:
     """Return the columns of edges (k, e, 5), float32, of shape (k, e, 1, 1)."""
-    return tuple(np.moveaxis(edges.astype(np.float32), -1, 0)[..., None, None])
+    edges = edges.astype(np.float32)[..., None, None]
+    return tuple(edges[:, :, column] for column in range(edges.shape[2]))
 
 
 def _away(
@@ -350,6 +349,16 @@ def _less_means(basis: np.ndarray, weight: np.ndarray, paper: int = len(_RADII))
         total[..., paper:] = total[..., paper:].mean(axis=-1, keepdims=True)
     less: np.ndarray = basis - (sums / total)[..., None, :]
     return less
+
+
+def _interpolated(values: np.ndarray, radii: np.ndarray) -> np.ndarray:
+    """Return values (k, n) that are known at `_RADII` at others (m,), as `np.interp`, (k, m)."""
+    known, values = _RADII.astype(np.float64), values.astype(np.float64)
+    at = radii.clip(known[0], known[-1])
+    below = np.searchsorted(known, at, side='right').clip(1, len(known) - 1) - 1
+    rise = np.diff(values, axis=1) / np.diff(known)
+    between: np.ndarray = rise[:, below] * (at - known[below]) + values[:, below]
+    return between
 
 
 def _slopes(values: np.ndarray, weight: np.ndarray) -> np.ndarray:

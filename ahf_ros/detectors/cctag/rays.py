@@ -163,15 +163,15 @@ def _as_seen(seen: Seen, model: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     What is seen between pixels is interpolated after they are clipped.
     """
     shown = np.clip(model, seen.lowest, seen.highest)
-    last = model.shape[2] - 1
+    count, rays, length = model.shape
+    rows, ray = np.arange(count)[:, None, None], np.arange(rays)[:, None]
+    before, after = (
+        np.clip(np.arange(length) + side[:, None, None], 0, length - 1)
+        for side in (-seen.apart, seen.apart)
+    )
 
     def mixed(values: np.ndarray) -> np.ndarray:
-        between = np.empty_like(values)
-        for apart in np.unique(seen.apart).tolist():
-            some = np.flatnonzero(seen.apart == apart)
-            beside = [(np.arange(last + 1) + side).clip(0, last) for side in (-apart, apart)]
-            before, after = (values[some][..., at] for at in beside)
-            between[some] = (before + after) / 2
+        between = (values[rows, ray, before] + values[rows, ray, after]) / 2
         return values + seen.mixed * (between - values)
 
     return seen.values - mixed(shown), mixed((shown == model).astype(np.float32))

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from itertools import product
 
 import numpy as np
@@ -112,6 +113,7 @@ class Prior:
             [shift - self.shift, np.log(blur / self.blur), sharpening - self.sharpening], axis=1
         )
 
+    @lru_cache(maxsize=64)  # noqa: B019, as a prior is a few numbers
     def tried(self, polarity: int) -> tuple[Edge, ...]:
         """Return the edges of templates, also clipped ones unless the polarity is 0."""
         of_shift, of_blur, of_sharpening = self.deviations
@@ -533,17 +535,17 @@ def _plain(seen: np.ndarray, rings: np.ndarray, good: np.ndarray, blur: np.ndarr
     profiles, inks = ((good * of).sum(axis=1) / np.maximum(shown, 1e-9) for of in (seen, rings))
     weights = np.sqrt(shown / shown.sum(axis=1, keepdims=True))
     edges = np.linspace(PROFILE[0], PROFILE[-1], 66)[3:-3, None]
-    found = np.empty(len(seen))
-    for index, (profile, ink, weight) in enumerate(zip(profiles, inks, weights, strict=True)):
-        line, _ = np.linalg.qr(np.stack([weight, PROFILE * weight], axis=1))
-        steps = normal_integral((edges - PROFILE) / blur[index]) * weight
-        profile, ink = profile * weight, ink * weight
-        profile, ink, steps = (of - (of @ line) @ line.T for of in (profile, ink, steps))
-        total = max(profile @ profile, 1e-12)
-        steps = steps / np.maximum(np.linalg.norm(steps, axis=1, keepdims=True), 1e-9)
-        along, alike = steps @ profile, steps @ steps.T
-        both = along[:, None] ** 2 + along**2 - 2 * alike * along[:, None] * along
-        shares = both / np.maximum(1 - alike**2, 1e-3) / total
-        share = (ink @ profile) ** 2 / max(ink @ ink, 1e-12) / total
-        found[index] = np.log(max(1 - shares.max(), 1e-6) / max(1 - share, 1e-6))
-    return found
+    line, _ = np.linalg.qr(np.stack([weights, PROFILE * weights], axis=2))
+    steps = normal_integral((edges - PROFILE) / blur[:, None, None])
+    values = np.concatenate([profiles[:, None], inks[:, None], steps], axis=1) * weights[:, None]
+    values -= (values @ line) @ line.transpose(0, 2, 1)
+    profile, ink, steps = values[:, 0], values[:, 1], values[:, 2:]
+    total = np.maximum((profile**2).sum(axis=1), 1e-12)
+    steps = steps / np.maximum(np.linalg.norm(steps, axis=2, keepdims=True), 1e-9)
+    along, alike = (steps @ profile[..., None])[..., 0], steps @ steps.transpose(0, 2, 1)
+    both = along[:, :, None] ** 2 + along[:, None] ** 2
+    both -= 2 * alike * along[:, :, None] * along[:, None]
+    of_two = (both / np.maximum(1 - alike**2, 1e-3)).max(axis=(1, 2)) / total
+    of_ink = (ink * profile).sum(axis=1) ** 2 / np.maximum((ink**2).sum(axis=1), 1e-12) / total
+    plain: np.ndarray = np.log(np.maximum(1 - of_two, 1e-6) / np.maximum(1 - of_ink, 1e-6))
+    return plain

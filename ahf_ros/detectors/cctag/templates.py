@@ -38,7 +38,15 @@ def size_steps(size: np.ndarray) -> np.ndarray:
 
 def by_value(values: np.ndarray) -> list[tuple[int, np.ndarray]]:
     """Return the values of some integers, each with the indices where it is."""
-    return [(value, np.flatnonzero(values == value)) for value in np.unique(values).tolist()]
+    order = values.argsort(kind='stable')
+    ordered = values[order]
+    ends = [*(ordered[1:] != ordered[:-1]).nonzero()[0].tolist(), len(order) - 1]
+    starts = [0, *(end + 1 for end in ends[:-1])]
+    return [
+        (int(ordered[start]), order[start : end + 1])
+        for start, end in zip(starts, ends, strict=True)
+        if len(order)
+    ]
 
 
 def less_lines(profiles: np.ndarray, every: int = 1) -> np.ndarray:
@@ -85,24 +93,18 @@ def templates(
     # IDs share circles, so that there are few to compute.
     signed, inverse = np.unique(table.round(6), return_inverse=True)
     most = MAXIMUM_SHIFT * family.narrow * size
-    tried = dict.fromkeys((float(np.clip(of[0], -most, most)), *of[1:]) for of in edges)
-    inks = []
-    for *edge, clipped in tried:
-        of_circles = (np.full(len(signed), of) for of in (size, *edge))
-        circles = _circles(signed[:, None], *of_circles)[0][:, ::every]
-        inks.append(_clipped(circles[inverse.reshape(table.shape)].sum(axis=1), clipped))
-    return _normalised(np.concatenate(inks), every), np.array([edge[:3] for edge in tried])
+    tried = np.array(list(dict.fromkeys((min(max(of[0], -most), most), *of[1:]) for of in edges)))
+    inks = _discs_along(signed, size, tried, every)
+    inks = inks[:, inverse.reshape(table.shape)].sum(axis=2)
+    return _normalised(_clipped(inks, tried[:, 3]), every), tried[:, :3]
 
 
 @lru_cache(maxsize=256)
 def discs(step: int, edges: tuple[Edge, ...] = (_USUAL_EDGE,), every: int = 1) -> np.ndarray:
     """Return the profiles of single discs of all radii, shape (t, n), as templates."""
-    radii = np.linspace(PROFILE[0], PROFILE[-1], 100)[3:-3, None]
-    inks = []
-    for *edge, clipped in edges:
-        of_discs = (np.full(len(radii), of) for of in (SIZE_STEP**step, *edge))
-        inks.append(_clipped(_circles(radii, *of_discs)[0][:, ::every], clipped))
-    return _normalised(np.concatenate(inks), every)
+    radii, tried = np.linspace(PROFILE[0], PROFILE[-1], 100)[3:-3], np.array(edges)
+    inks = _discs_along(radii, SIZE_STEP**step, tried, every)
+    return _normalised(_clipped(inks, tried[:, 3]), every)
 
 
 def two_discs(profiles: np.ndarray, step: int) -> np.ndarray:
@@ -115,10 +117,28 @@ def two_discs(profiles: np.ndarray, step: int) -> np.ndarray:
     return shares / np.maximum((profiles**2).sum(axis=1), 1e-9)
 
 
-def _clipped(inks: np.ndarray, share: float) -> np.ndarray:
-    """Return inks less a share of the contrast, below 0 of ink and otherwise of paper."""
-    clipped: np.ndarray = np.maximum(inks, share) if share > 0 else np.minimum(inks, 1 + share)
-    return clipped if share else inks
+def _discs_along(signed: np.ndarray, size: float, edges: np.ndarray, every: int) -> np.ndarray:
+    """Return the ink of single circles (c,) along the profile, for edges (e, 4), (e, c, n)."""
+    shift, blur, more = edges[:, :3].astype(np.float32).T[..., None, None]
+    signed = signed[:, None].astype(np.float32)
+    sign = np.sign(signed)
+    radii = np.abs(signed) * size + sign * shift
+    seen, masked = (
+        sign * normal_integral((radii - _places(of, size)[..., ::every] * size) / of)
+        for of in (blur, np.hypot(blur, np.float32(MASK)))
+    )
+    along: np.ndarray = (1 + more) * seen - more * masked
+    return along
+
+
+def _clipped(inks: np.ndarray, shares: np.ndarray) -> np.ndarray:
+    """Return inks (e, t, n) less shares of the contrast (e,), one after the other, (e t, n).
+
+    Below 0 it is less of ink and otherwise less of paper.
+    """
+    least = np.where(shares > 0, shares, -np.inf).astype(np.float32)[:, None, None]
+    most = np.where(shares < 0, 1 + shares, np.inf).astype(np.float32)[:, None, None]
+    return np.clip(inks, least, most).reshape(-1, inks.shape[2])
 
 
 def rings_along(
@@ -171,9 +191,7 @@ def _blurred(
     radii: np.ndarray, sign: np.ndarray, size: np.ndarray, blur: np.ndarray
 ) -> list[np.ndarray]:
     """Return the ink of circles of radii (k, c, 1), px, and its derivatives, shape (k, n) each."""
-    # Blur moves what lies near to the centre outwards, on the mean (Rice).
-    place = np.sqrt(ALONG**2 + (blur / size) ** 2)
-    away = (radii - place * size) / blur
+    away = (radii - _places(blur, size) * size) / blur
     density = sign * np.exp(-0.5 * away**2) / math.sqrt(2 * math.pi)
     return [
         (sign * normal_integral(away)).sum(axis=1),
@@ -181,6 +199,12 @@ def _blurred(
         (sign * density / blur).sum(axis=1),
         -(density * away).sum(axis=1),
     ]
+
+
+def _places(blur: np.ndarray, size: np.ndarray | float) -> np.ndarray:
+    """Return where along the profile blur moves what lies near to the centre, outwards (Rice)."""
+    places: np.ndarray = np.sqrt(ALONG**2 + (blur / size) ** 2)
+    return places
 
 
 def _signs(radii: np.ndarray) -> np.ndarray:

@@ -54,7 +54,7 @@ def unlike_print(
     ink = inked[..., None] & deep[:, None] & visible
     unmarked = ~lengthened(marked, overhang + away)
     paper = ((gap | beyond)[:, None] | (unmarked[..., None] & near[:, None])) & visible
-    ground = np.broadcast_to(beyond[:, None] & visible, polar.gray.shape)
+    ground = np.broadcast_to(beyond[:, None] & visible, (*polar.reach.shape, radii.shape[1]))
     step = _step_shares(polar, ground)
     uneven = (np.abs(step) > _EVEN) & ground
     even = uneven.sum(axis=(1, 2)) < _UNEVEN * ground.sum(axis=(1, 2))
@@ -79,14 +79,15 @@ def unlike_print(
 
 def _step_shares(polar: PolarImages, ground: np.ndarray) -> np.ndarray:
     """Return steps of ln from the usual gray value of ground, in those of ink, (k, m, n)."""
+    gray = polar.gray[polar.row]
     beyond = np.asarray(ground.any(axis=(0, 1)))
     beyond[-1] = True  # blur may leave none
     flat = len(ground), ground.shape[1] * int(beyond.sum())
-    levels, known = (of[..., beyond].reshape(flat) for of in (polar.gray, ground))
+    levels, known = (of[..., beyond].reshape(flat) for of in (gray, ground))
     paper = median(levels, known)[:, None]
     ink = polar.inked(paper, paper)
     of_paper, of_ink = (np.log(of + LOG_OFFSET)[..., None] for of in (paper, ink))
-    values = np.log(polar.gray + np.float32(LOG_OFFSET))
+    values = np.log(gray + np.float32(LOG_OFFSET))
     step = np.where(of_ink == of_paper, np.inf, of_ink - of_paper)
     shares: np.ndarray = (values - of_paper) / step
     return shares

@@ -7,7 +7,7 @@ those that none of the clearest dots shows are not read at all.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -24,8 +24,8 @@ _CLEAR = 0.5  # bound of the mean evidence of a reading, which spots of light ha
 _SEVERAL = 3  # words that show a family where no dot is so clear
 _ROUGH = (0.0,)  # shifts of edges that are tried to find these, px
 _SAMPLE = 8  # of those that seem to have a print, which are read first
-_MORE = 3  # times as many, where these show nothing
 _LIKELIEST = 16  # dots to have a print, of which none shows that it is not there
+_CONCEIVABLE = 0.1  # confidence of a word of many, from which it may be certain as one of few
 _NEARLY = 0.05  # mean evidence of a reading, by which a print is as good as the best one
 _PRINTS = 3  # the most likely ones, which are tried on the same dots
 
@@ -33,13 +33,14 @@ _PRINTS = 3  # the most likely ones, which are tried on the same dots
 def choose_families(gray: np.ndarray, dots: Fit, families: Sequence[Family]) -> list[Family]:
     """Return as few of some families as have all words of the print that the clearest dots show.
 
-    Where these show none, further ones are looked at.
+    Where these show none, the likeliest ones of the others are looked at.
     """
     order = np.argsort(-dots.share * (1 - dots.contrast), kind='stable')
-    shown = (
-        _words_shown(gray, dots.select(some), families) for some in _growing(order, _CLEAREST)
-    )
-    return present_families(next(filter(None, shown), []))[0]
+    clearest, others = dots.select(order[:_CLEAREST]), dots.select(order[_CLEAREST:])
+    words = _words_shown(gray, clearest, families)
+    if not words and len(others.frames):
+        words = _words_shown(gray, others, families, _SAMPLE)
+    return present_families(words)[0]
 
 
 def further_families(gray: np.ndarray, dots: Fit, families: Sequence[Family]) -> list[Family]:
@@ -53,30 +54,29 @@ def further_families(gray: np.ndarray, dots: Fit, families: Sequence[Family]) ->
     return present_families(_words_shown(gray, dots.select(order), families))[0]
 
 
-def _growing(order: np.ndarray, count: int) -> Iterator[np.ndarray]:
-    """Yield the first `count` indices, and then parts that grow."""
-    start = 0
-    while start < len(order):
-        yield order[start : start + count]
-        start, count = start + count, _MORE * count
-
-
 def _words_shown(
-    gray: np.ndarray, dots: Fit, families: Sequence[Family]
+    gray: np.ndarray, dots: Fit, families: Sequence[Family], most: int = _LIKELIEST
 ) -> list[dict[Family, int]]:
-    """Return words of the likeliest print of some dots that has any, by family."""
+    """Return words of the likeliest print of some dots that has any, by family.
+
+    Of each print so many of the likeliest dots are read at the most, of the likeliest print a
+    sample first, as it is nearly always the right one.
+    """
     prints = list(dict.fromkeys((code.band, code.bits) for code in families))
     mean = bounds(gray, dots, prints)
     hopeful = (mean.max(axis=0) > HOPEFUL) & (dots.share >= ENOUGH)
     dots, mean = dots.select(hopeful), mean[:, hopeful]
     likely = mean > mean.max(axis=0, initial=-np.inf) - _NEARLY
-    for best in np.argsort(-np.maximum(mean, 0).sum(axis=1), kind='stable')[:_PRINTS].tolist():
+    by_print = np.argsort(-np.maximum(mean, 0).sum(axis=1), kind='stable')[:_PRINTS].tolist()
+    for rank, best in enumerate(by_print):
         band, bits = prints[best]
         # Whatever has a number of sectors has its multiples as well.
         same = [code for code in families if code.band == band and bits % code.bits == 0]
         words: list[tuple[Family, int]] = []
         order = np.argsort(-mean[best], kind='stable')
-        for some in _growing(order[likely[best, order]][:_LIKELIEST], _SAMPLE):
+        likeliest = order[likely[best, order]][:most]
+        ends = [0, _SAMPLE, most] if rank == 0 else [0, most]
+        for some in filter(len, (likeliest[part] for part in map(slice, ends, ends[1:]))):
             words += _read(gray, dots.select(some), same)
             if len(words) >= _SEVERAL or (words and mean[best, some].max() > _CLEAR):
                 return [words_of_print(code, word, tuple(families)) for code, word in words]
@@ -84,8 +84,27 @@ def _words_shown(
 
 
 def _read(gray: np.ndarray, dots: Fit, families: Sequence[Family]) -> list[tuple[Family, int]]:
-    """Return the words of dots, by those of some families that explain their bands best."""
+    """Return the words of dots, by those of some families that explain their bands best.
+
+    Families that have all words of others are read first. Where they find nothing conceivable,
+    the others find nothing, as they have no other words.
+    """
     dots, _ = measure_likely(gray, dots, None)
-    read = contested(Hypotheses.joined([read_bands(gray, dots, code) for code in families]))
+    narrow = [code for code in families if _has_wider(code, families)]
+    found = [read_bands(gray, dots, code) for code in families if code not in narrow]
+    conceivable = np.any([of.confidence >= _CONCEIVABLE for of in found], axis=0)
+    if conceivable.any():
+        found += [read_bands(gray, dots.select(conceivable), code) for code in narrow]
+    read = contested(Hypotheses.joined(found))
     read = read.select(read.certain & (read.coded > -DOUBT))
     return list(zip(read.families.tolist(), decoded(read)[1].tolist(), strict=True))
+
+
+def _has_wider(code: Family, families: Sequence[Family]) -> bool:
+    """Return whether another of some families has all words of one, in the same print."""
+    return any(
+        (code.band, code.bits) == (other.band, other.bits)
+        and len(code.words) < len(other.words)
+        and bool(np.isin(code.words, other.words).all())
+        for other in families
+    )

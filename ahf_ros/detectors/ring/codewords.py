@@ -73,28 +73,27 @@ def likeliest_bits(ones: np.ndarray, pairs: np.ndarray) -> tuple[np.ndarray, np.
 
     The evidence is that of `best_words`. By dynamic programming, once for each first bit.
     """
-    count = ones.shape[-1]
+    count, bands = ones.shape[-1], ones.shape[:-1]
+    ones, pairs = (of.reshape(-1, count).T for of in (ones, pairs))
     # The first axis is the first bit, the second one the last bit so far.
-    scores = np.full((2, 2, *ones.shape[:-1]), -np.inf)
-    scores[0, 0], scores[1, 1] = 0.0, ones[..., 0]
+    scores = np.full((2, 2, ones.shape[1]), -np.inf)
+    scores[0, 0], scores[1, 1] = 0.0, ones[0]
     before = np.zeros((count, *scores.shape), bool)
     for bit in range(1, count):
         zero, one = scores[:, 0], scores[:, 1]
-        joined = one + pairs[..., bit]
+        joined = one + pairs[bit]
         before[bit, :, 0], before[bit, :, 1] = one > zero, joined > zero
-        scores = np.stack(
-            [np.maximum(zero, one), np.maximum(zero, joined) + ones[..., bit]], axis=1
-        )
-    scores[1, 1] += pairs[..., 0]
-    ends = scores.reshape(4, *ones.shape[:-1])
+        scores[:, 0], scores[:, 1] = np.maximum(zero, one), np.maximum(zero, joined) + ones[bit]
+    scores[1, 1] += pairs[0]
+    ends = scores.reshape(4, -1)
     best, highest = ends.argmax(axis=0), ends.max(axis=0)
     first, last = best >> 1, best & 1
-    bits = np.zeros(ones.shape, bool)
-    flat = before.reshape(count, 4, *ones.shape[:-1])
+    bits = np.zeros((len(best), count), bool)
+    flat, rows = before.reshape(count, 4, -1), np.arange(len(best))
     for bit in range(count - 1, -1, -1):
-        bits[..., bit] = last
-        last = np.take_along_axis(flat[bit], (2 * first + last)[None], axis=0)[0].astype(int)
-    return bits, highest
+        bits[:, bit] = last
+        last = flat[bit, 2 * first + last, rows]
+    return bits.reshape(*bands, count), highest.reshape(bands)
 
 
 def _beside(bits: np.ndarray, ones: np.ndarray, pairs: np.ndarray) -> np.ndarray:

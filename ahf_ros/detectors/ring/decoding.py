@@ -18,7 +18,6 @@ from ahf_ros.detectors.ring.likelihood import SURPRISES, Evidence
 from ahf_ros.features.array_record import ArrayRecord
 from ahf_ros.features.normal import normal_integral
 
-_COVER = 6.0  # price of something that covers a stretch of the band
 _MAXIMUM_READING = 5.0  # for or against a word
 _LIKE_PAPER = 8.5  # the same of something that looks like paper
 _IN_LIGHT = 15.0  # times the probability of edges of light beyond the least, by which that grows
@@ -30,6 +29,9 @@ _NEAR = 3  # angles on either side of the clearest one
 _REFINED = 2  # best words, that compete at the phases beside theirs as well
 _PHASE = 0.5  # error of the phase of sectors, angles
 _NEVER = np.float32(-np.inf)
+
+COVER = 6.0
+"""Price of something that covers a stretch of the band."""
 
 CLEAR = 15.0
 """Log odds of a word against the next ID that leave no doubt of it."""
@@ -117,7 +119,7 @@ def decode(
     `overhang`, shape (k,), is by how many angles ink is longer at either end than its sectors;
     `expected` are IDs that are likely to be there. Empty: all IDs are equally likely.
     """
-    of_bands = _doubted(evidence)
+    of_bands = without_outliers(evidence)
     count, angles = of_bands.paper.shape
     per_sector = angles // family.bits
     cap = _RANKED * of_bands.weight[:, None]
@@ -192,7 +194,7 @@ def decode(
     return decoded.replaced(read, found)
 
 
-def _doubted(evidence: Evidence) -> Evidence:
+def without_outliers(evidence: Evidence) -> Evidence:
     """Return the evidence of whole bands, (k, m), no reading of which counts too much.
 
     Light may do anything at any angle.
@@ -266,15 +268,10 @@ def _of_sectors(
     """
     count = ranked.shape[1]
     per_sector = count // family.bits
-    sums = np.zeros_like(ranked)
-    begins, ends = np.zeros((2, *ranked.shape))
+    about = _about(ranked, np.arange(-per_sector, per_sector))
     rising, falling = spread_ends(overhang, blur, per_sector)
-    for step, (rise, fall) in enumerate(zip(rising.T, falling.T, strict=True), -per_sector):
-        ahead = np.roll(ranked, -step, axis=1)
-        if step >= 0:
-            sums += ahead
-        begins += rise[:, None] * ahead
-        ends += fall[:, None] * ahead
+    begins, ends = ((about * of[:, None]).sum(axis=2) for of in (rising, falling))
+    sums = about[..., per_sector:].sum(axis=2)
     ones, pairs = sums + begins + np.roll(ends, -per_sector, axis=1), -(begins + ends)
     first = np.arange(per_sector)[:, None] + np.arange(0, count, per_sector)
     return ones[:, first], pairs[:, first]
@@ -314,7 +311,7 @@ def lengthened(bits: np.ndarray, overhang: np.ndarray) -> np.ndarray:
 def _clearest(evidence: Evidence) -> np.ndarray:
     """Return the angles of each band from that on at which it is seen best, shape (k, m)."""
     best = np.maximum(evidence.paper, evidence.ink)
-    window = np.sum([np.roll(best, shift, axis=1) for shift in range(-_NEAR, _NEAR + 1)], axis=0)
+    window = _about(best, np.arange(-_NEAR, _NEAR + 1)).sum(axis=2)
     return (window.argmax(axis=1)[:, None] + np.arange(best.shape[1])) % best.shape[1]
 
 
@@ -372,7 +369,7 @@ def _covered_paths(seen: np.ndarray, as_paper: np.ndarray, of: Evidence) -> np.n
     for of_angle, of_paper in zip(seen[1:], as_paper[1:], strict=True):
         before = clear
         clear = np.maximum(np.maximum(clear, covered), like_paper) + of_angle
-        covered = np.maximum(covered, before - np.float32(_COVER)) - cost
+        covered = np.maximum(covered, before - np.float32(COVER)) - cost
         like_paper = np.maximum(like_paper, before - price)
         like_paper += of_paper - more
     return np.maximum(np.maximum(clear, covered), like_paper)
@@ -394,27 +391,32 @@ def _hidden(
 
 
 def _backtracked(seen: np.ndarray, as_paper: np.ndarray, of: Evidence) -> np.ndarray:
-    """Return the same for bands of which a part is covered."""
-    cost = np.float32(_COVERED) * of.weight
+    """Return the same for bands of which a part is covered.
+
+    Of the best path to each angle and the best one from there, by what the band is there: seen,
+    covered, or covered by something like paper.
+    """
+    count, bands = seen.shape
+    cost = np.broadcast_to(np.float32(_COVERED) * of.weight, seen.shape)
     price, more = _like_paper(of)
-    prices = np.stack([0 * cost, np.full_like(cost, _COVER), price])
-    scores = np.full((3, seen.shape[1]), _NEVER)
-    scores[0] = seen[0]
-    came = np.zeros((len(seen), 3, seen.shape[1]), np.intp)
-    rows = np.arange(seen.shape[1])
-    for index in range(1, len(seen)):
-        begun = scores[0] - prices
-        came[index] = np.where(scores >= begun, np.arange(3)[:, None], 0)
-        came[index, 0] = scores.argmax(axis=0)
-        best = np.maximum(scores, begun)
-        best[0] = scores.max(axis=0)
-        scores = best + np.stack([seen[index], -cost, as_paper[index] - more])
-    hidden = np.empty(seen.shape, bool)
-    state = scores.argmax(axis=0)
-    for index in range(len(seen) - 1, -1, -1):
-        hidden[index] = state > 0
-        state = came[index, state, rows]
-    return hidden.T
+    gains = np.stack([seen, -cost, as_paper - more], axis=1)
+    until, after = np.full((2, count, 3, bands), _NEVER)
+    until[0, 0], after[-1] = seen[0], 0
+    cover = np.float32(COVER)
+    for index in range(1, count):
+        clear, covered, like_paper = until[index - 1]
+        of_clear, of_covered, of_paper = until[index]
+        np.maximum(np.maximum(clear, covered), like_paper, out=of_clear)
+        np.maximum(covered, clear - cover, out=of_covered)
+        np.maximum(like_paper, clear - price, out=of_paper)
+        until[index] += gains[index]
+        clear, covered, like_paper = after[-index] + gains[-index]
+        of_clear, of_covered, of_paper = after[-index - 1]
+        np.maximum(clear, covered, out=of_covered)
+        np.maximum(clear, like_paper, out=of_paper)
+        np.maximum(clear, np.maximum(covered - cover, like_paper - price), out=of_clear)
+    whole = (until + after).transpose(1, 2, 0)
+    return np.asarray(np.maximum(whole[1], whole[2]) > whole[0])
 
 
 def _borders(bits: np.ndarray, unknown: np.ndarray) -> np.ndarray:
@@ -448,8 +450,13 @@ def _of_borders(
 
 def _any_of_next(which: np.ndarray, count: int, before: int = 0) -> np.ndarray:
     """Return whether any of some angles is, from so many before each one on, both (k, m)."""
-    steps = range(-before, count - before)
-    return np.logical_or.reduce([np.roll(which, -step, axis=1) for step in steps])
+    return np.asarray(_about(which, np.arange(-before, count - before)).any(axis=2))
+
+
+def _about(values: np.ndarray, steps: np.ndarray) -> np.ndarray:
+    """Return values (k, m) some steps (n,) along the band from each angle, shape (k, m, n)."""
+    count = values.shape[1]
+    return np.asarray(values[:, (np.arange(count)[:, None] + steps) % count])
 
 
 def _border(evidence: Evidence) -> np.ndarray:
@@ -462,28 +469,22 @@ def _free_paths(evidence: Evidence) -> tuple[np.ndarray, np.ndarray]:
 
     With it comes the number of borders of these arcs, each of which has its price.
     """
-    cost = np.float32(_COVERED) * evidence.weight
-    border, cover = _border(evidence), np.float32(_COVER)
-    paper, ink = evidence.paper.T, evidence.ink.T
-    white, dark = paper[0], ink[0]
-    covered = np.full_like(white, _NEVER)
-    of_white, of_dark, of_covered = np.zeros((3, len(white)), np.intp)
+    cost, cover = np.float32(_COVERED) * evidence.weight, np.float32(COVER)
+    looks = np.stack([evidence.paper, evidence.ink]).transpose(2, 0, 1)
     between = evidence.between.max(axis=1, initial=0).T
-    mixed = np.maximum(np.maximum(paper, ink), between) - border
-    for of_paper, of_ink, of_border in zip(paper[1:], ink[1:], mixed[1:], strict=True):
-        begun, of_begun = _better(white, of_white, dark, of_dark)
-        to_white, to_dark = (dark + of_border, of_dark + 1), (white + of_border, of_white + 1)
-        white, of_white = _better(white, of_white, covered, of_covered)
-        dark, of_dark = _better(dark, of_dark, covered, of_covered)
-        white, of_white = _better(white + of_paper, of_white, *to_white)
-        dark, of_dark = _better(dark + of_ink, of_dark, *to_dark)
-        covered, of_covered = _better(covered, of_covered, begun - cover, of_begun)
-        covered = covered - cost
-    return _better(*_better(white, of_white, dark, of_dark), covered, of_covered)
-
-
-def _better(
-    score: np.ndarray, count: np.ndarray, other: np.ndarray, of_other: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return the scores of the better ones of two paths, and what was counted along these."""
-    return np.maximum(score, other), np.where(other > score, of_other, count)
+    mixed = np.maximum(np.maximum(looks[:, 0], looks[:, 1]), between) - _border(evidence)
+    seen, covered = looks[0], np.full_like(cost, _NEVER)  # of paths that end on paper or ink
+    borders, of_covered = np.zeros(seen.shape, np.intp), np.zeros(cost.shape, np.intp)
+    for here, border in zip(looks[1:], mixed[1:], strict=True):
+        begun = np.maximum(seen[0], seen[1]) - cover
+        of_begun = borders[0] + (seen[1] > seen[0]) * (borders[1] - borders[0])
+        turned, of_turned = seen[::-1] + border, borders[::-1] + 1
+        stayed = np.maximum(seen, covered) + here
+        of_stayed = borders + (covered > seen) * (of_covered - borders)
+        borders = of_stayed + (turned > stayed) * (of_turned - of_stayed)
+        seen = np.maximum(stayed, turned)
+        of_covered = of_covered + (begun > covered) * (of_begun - of_covered)
+        covered = np.maximum(covered, begun) - cost
+    ends = np.concatenate([seen, covered[None]])
+    best, of_ends = ends.argmax(axis=0), np.concatenate([borders, of_covered[None]])
+    return ends.max(axis=0), of_ends[best, np.arange(len(best))]

@@ -44,6 +44,7 @@ from ahf_ros.imaging.faint import faint_parts
 from ahf_ros.imaging.image import as_gray, check_image
 from ahf_ros.target import UNDECODED, Target, UndecodedTarget, sorted_targets
 
+_PART = 128  # dots of one colour that are read at a time
 _UNLIKELY = 0.02  # confidence of a word below which a dot counts as unread
 
 
@@ -119,7 +120,7 @@ def find_hypotheses(
 def hypotheses_in(
     pyramid: ImagePyramid, settings: DetectorSettings, expected: frozenset[int]
 ) -> Hypotheses:
-    """Return the same of the pyramid of an image."""
+    """Find the dots and words in an image pyramid; see `find_hypotheses`."""
     found = read_pyramid(pyramid, settings, expected, PROPOSALS)
     for part in faint_parts(pyramid.gray):
         seen = read_image(part.gray, settings, expected, (propose_whole,))
@@ -144,70 +145,109 @@ def read_image(
     return read_pyramid(image_pyramid(gray, settings.max_radius), settings, expected, proposals)
 
 
+@dataclass(frozen=True, slots=True)
+class _Seen:
+    """What was read of an image so far, and what this explains, in px of the image."""
+
+    found: tuple[Hypotheses, ...]
+    explained: Explained
+
+    def after(self, read: Hypotheses) -> _Seen:
+        """Return the same with what was read next."""
+        explained = Explained.joined([self.explained, Explained.by(read)])
+        return _Seen((*self.found, read), explained)
+
+    def prior(self, expected: frozenset[int], level: int) -> Prior:
+        """Return what is known of targets in the image halved `level` times."""
+        shifts = self.explained.shifts[self.explained.certain]
+        return Prior.after(expected, shifts / 2**level)
+
+
 def read_pyramid(
     pyramid: ImagePyramid,
     settings: DetectorSettings,
     expected: frozenset[int],
     proposals: Sequence[Proposal],
 ) -> Hypotheses:
-    """Return the same of the pyramid of an image."""
+    """Find the dots and words in an image pyramid; see `read_image`."""
     described: Sequence[Family] = settings.codes(Family)
     families = described
     shown = list(families) if len(families) == 1 else []
     images = (pyramid.gray, *pyramid.halves)
-    found = [Hypotheses.unread(NO_FITS, families[0])]
-    explained = Explained.by(found[0])
+    nothing = Hypotheses.unread(NO_FITS, families[0])
+    seen = _Seen((nothing,), Explained.by(nothing))
     measured: list[tuple[Octave, Fit]] = []
-
-    def full_size(octave: Octave, read: Hypotheses) -> Hypotheses:
-        return at_full_size(images[: octave.level + 1], read)
-
-    def read_dots(octave: Octave, dots: Fit, codes: Sequence[Family]) -> Explained:
-        if not len(dots.frames):
-            return explained
-        shifts = explained.shifts[explained.certain] / 2**octave.level
-        read = read_families(octave.pyramid.gray, dots, codes, Prior.after(expected, shifts))
-        found.append(full_size(octave, read))
-        return Explained.joined([explained, Explained.by(found[-1])])
-
+    every = settings.report_undecoded
     for octave in octaves(pyramid, *settings.radii):
         part, fits = octave.pyramid.gray, [NO_FITS]
         for propose in proposals:
-            proposed = propose(octave, settings.polarities, explained)
+            proposed = propose(octave, settings.polarities, seen.explained)
             proposed = with_rims(proposed, families, octave.radii[0])
-            dots = measure_dots(part, proposed, covariances=settings.report_undecoded)
+            dots = measure_dots(part, proposed, covariances=every)
             families = with_measured_bands(part, dots, families)
             by_name = {code.name: code for code in families}
             shown = [by_name[code.name] for code in shown]
             shown = shown or choose_families(part, dots, families)
             codes = shown or families[:1]
-            likely, others = measure_likely(
-                part, dots, None if settings.report_undecoded else codes
-            )
-            unread = full_size(octave, Hypotheses.unread(others, families[0]))
-            explained = Explained.joined([explained, Explained.by(unread)])
-            explained = read_dots(octave, likely, codes)
+            likely, others = measure_likely(part, dots, None if every else codes)
+            unread = Hypotheses.unread(others, families[0])
+            seen = seen.after(at_full_size(images[: octave.level + 1], unread))
+            seen = _read(octave, images, likely, codes, seen, expected, every=every)
             fits.append(dots)
         measured.append((octave, Fit.joined(fits)))
     for octave, dots in measured:
         part = octave.pyramid.gray
         while shown:
-            targets = explained.select(explained.certain)
+            targets = seen.explained.select(seen.explained.certain)
             rest = dots.select(~targets.on_them(dots.frames, octave.level))
             left = [code for code in families if code not in shown]
             codes = further_families(part, rest, left)
             if not codes:
                 break
-            clear = explained.select(explained.clear)
+            clear = seen.explained.select(seen.explained.clear)
             dots = dots.select(~clear.on_them(dots.frames, octave.level))
-            explained = read_dots(octave, measure_likely(part, dots, codes)[0], codes)
+            likely, _ = measure_likely(part, dots, codes)
+            seen = _read(octave, images, likely, codes, seen, expected, every=every)
             shown = shown + codes
-    every = Hypotheses.joined(found)
+    read = Hypotheses.joined(seen.found)
     if len(shown) > 1:
-        every = contested(every)
+        read = contested(read)
     named = {code.name: code for code in described}
-    as_described = [named[code.name] for code in every.families]
-    return replace(every, families=np.array(as_described, object))
+    as_described = [named[code.name] for code in read.families]
+    return replace(read, families=np.array(as_described, object))
+
+
+def _read(
+    octave: Octave,
+    images: Sequence[np.ndarray],
+    dots: Fit,
+    codes: Sequence[Family],
+    seen: _Seen,
+    expected: frozenset[int],
+    *,
+    every: bool,
+) -> _Seen:
+    """Return what is seen once dots of an octave are read, the most hopeful ones first.
+
+    Thousands of spots of light or letters look a little like dots with a band. They are mostly of
+    one colour, and must not crowd out the other. Where a part of the dots of a colour shows no
+    target, less hopeful ones are left unread, unless `every` one is asked for.
+    """
+    left = [dots.select(dots.polarity == polarity) for polarity in (1, -1)]
+    while any(len(of.frames) for of in left):
+        part = Fit.joined([of.select(slice(_PART)) for of in left])
+        prior = seen.prior(expected, octave.level)
+        read = read_families(octave.pyramid.gray, part, codes, prior)
+        seen = seen.after(at_full_size(images[: octave.level + 1], read))
+        shown = set(read.polarity[read.certain])
+        for index, polarity in enumerate((1, -1)):
+            rest = left[index].select(slice(_PART, None))
+            if not (every or polarity in shown):
+                unread = Hypotheses.unread(rest, codes[0])
+                seen = seen.after(at_full_size(images[: octave.level + 1], unread))
+                rest = NO_FITS
+            left[index] = rest
+    return seen
 
 
 def report(

@@ -12,16 +12,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from ahf_ros.codes.ring import FAMILY_NAMES, Family, canonical, family, words_of_print
+from ahf_ros.codes.ring import Family, canonical, words_of_print
 from ahf_ros.detectors.claims import leading
 from ahf_ros.detectors.ring.hypotheses import Hypotheses
 from ahf_ros.detectors.ring.known import NOTHING_KNOWN, Prior
 from ahf_ros.detectors.ring.reading import read_bands
+from ahf_ros.detectors.ring.rivals import against_rivals, has_all, odds
 from ahf_ros.features import frame
 from ahf_ros.features.circle_fit import Fit
 
-_FIRST = 8  # doubtful words that rivals read first
-_MORE_SEEN = 6.0  # log odds against anything, by which a family that is not read beats one that is
 _DOUBT = 0.05  # odds of another family that has all prints, up to which one is sure
 _ALL_WORDS = 0.5  # odds of a family of all words against one of a rule, before any print is seen
 
@@ -38,7 +37,7 @@ def read_families(
     """
     first, *others = families
     found = read_bands(gray, dots, first, prior)
-    found = _against_rivals(gray, dots, found, families, prior)
+    found = against_rivals(gray, dots, found, families, prior)
     if not others:
         return found
     rest = dots.select(~found.clear)
@@ -49,56 +48,13 @@ def read_families(
     return contested(Hypotheses.joined(parts))
 
 
-def _against_rivals(
-    gray: np.ndarray, dots: Fit, found: Hypotheses, families: Sequence[Family], prior: Prior
-) -> Hypotheses:
-    """Return hypotheses of dots, none certain where a family that is not read has more evidence.
-
-    Where arcs of any length explain a band nearly as well as its word, it may be one of theirs. It
-    is if its arcs and its radii are. Where rivals contest most of the most doubtful words, they
-    read all.
-    """
-    certain = np.flatnonzero(found.certain)
-    order = certain[np.argsort(found.coded[certain], kind='stable')]
-    first = order[: min(_FIRST, (~found.clear[certain]).sum())]
-    known = [family(name) for name in FAMILY_NAMES]
-    rivals = [rival for rival in known if not any(_has_all(code, rival) for code in families)]
-    confidence = found.confidence.copy()
-    for some in (first, order[len(first) :]):
-        if not some.size or not rivals:
-            break
-        word = found.select(some)
-        others = [read_bands(gray, dots.select(some), code, prior) for code in rivals]
-        better = [
-            (_odds(other) > _odds(word)) & (other.seen > word.seen + _MORE_SEEN)
-            for other in others
-        ]
-        beaten = np.any(better, axis=0)
-        confidence[some[beaten]] = 0.0
-        if beaten.mean() < 0.5:
-            break
-    return replace(found, confidence=confidence)
-
-
 def _narrowest(words: dict[Family, int]) -> dict[Family, int]:
     """Return words of a print without those of families that have all words of another one."""
     return {
         code: word
         for code, word in words.items()
-        if not any(_has_all(code, of) and len(of.words) < len(code.words) for of in words)
+        if not any(has_all(code, of) and len(of.words) < len(code.words) for of in words)
     }
-
-
-def _has_all(code: Family, other: Family) -> bool:
-    """Return whether a family has all words of another one, in the same print."""
-    same = (code.band, code.bits) == (other.band, other.bits)
-    return same and bool(np.isin(other.words, code.words).all())
-
-
-def _odds(read: Hypotheses) -> np.ndarray:
-    """Return how well words of any family agree with arcs, -inf if they are not certain, (k,)."""
-    choices = [len(code.words) * code.bits for code in read.families]
-    return np.where(read.certain, read.coded - np.log(np.maximum(choices, 1)), -np.inf)
 
 
 def contested(read: Hypotheses) -> Hypotheses:
@@ -110,7 +66,7 @@ def contested(read: Hypotheses) -> Hypotheses:
         near = np.hypot(*(centres - centres[index]).T) < minor[index]
         return near & (names != names[index])
 
-    beaten = read.certain & ~leading(_odds(read), read.certain, rivals, 1.0)
+    beaten = read.certain & ~leading(odds(read), read.certain, rivals, 1.0)
     return replace(read, confidence=np.where(beaten, 0.0, read.confidence))
 
 
@@ -130,6 +86,8 @@ def settle_same_prints(hypotheses: Hypotheses, families: Sequence[Family]) -> Hy
     Where two families of an image have a print, it is of the one whose words the other has all, or
     the nearest target that only one of them has tells which it is.
     """
+    if len(families) == 1:
+        return hypotheses
     codes = decoded(hypotheses)[1]
     certain = np.flatnonzero(hypotheses.certain).tolist()
     prints = {

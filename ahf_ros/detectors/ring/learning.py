@@ -31,7 +31,7 @@ from ahf_ros.features.array_record import ArrayRecord
 from ahf_ros.features.circle_fit import ENOUGH, NO_FITS, Fit, fit_dots
 from ahf_ros.features.dot_search import voted_dots, whole_dots
 from ahf_ros.features.dots import Dots
-from ahf_ros.features.pyramid import image_pyramid, octaves
+from ahf_ros.features.pyramid import Octave, image_pyramid, octaves
 from ahf_ros.features.robust import NORMAL, median
 from ahf_ros.features.sampling import sample_circles
 from ahf_ros.imaging.image import as_gray, as_light, check_image
@@ -42,6 +42,8 @@ MINIMUM_TARGETS = 5
 _INK_CONTRAST = 0.1  # gray value of ink over that of paper, below which there is no gamma
 _ANGLES = 480
 _RADII = np.arange(1.05, 5.5, 0.05)  # of circles that are read, dot radii
+_TRIED = 4  # times as many dots as are asked for, which are measured
+_PART = 32  # dots about which circles are read at a time, which bounds the memory
 _CENTRE = np.arange(0.025, 0.4, 0.025)  # of circles about a pinhole, dot radii
 _INK, _PAPER = np.array([0.5, 0.6]), np.array([1.3, 1.4])  # of circles beside it
 _PINHOLE = 0.025  # radius of a hole that is seen, dot radii
@@ -134,24 +136,53 @@ class LearntFamily:
         ]
 
 
-@one_blas_thread()
 def find_bands(images: Iterable[np.ndarray], settings: DetectorSettings) -> Bands:
     """Return the dots of images that have a concentric band, of whatever family.
 
     Of `settings`, the radii of dots and their polarity count.
     """
+    return bands_about(dots_in(image, settings) for image in images)
+
+
+DotsOfOctave = tuple[Octave, list[Dots]]
+"""An octave, and the dots that each way of searching finds in it."""
+
+
+def dots_in(image: np.ndarray, settings: DetectorSettings) -> list[DotsOfOctave]:
+    """Return the dots of an image that may have bands, whole ones first."""
+    check_image(image)
+    pyramid = image_pyramid(as_gray(image), settings.max_radius)
+    return [
+        (
+            octave,
+            [
+                search(octave.pyramid, *octave.radii, settings.polarities)
+                for search in (whole_dots, voted_dots)
+            ],
+        )
+        for octave in octaves(pyramid, *settings.radii)
+    ]
+
+
+@one_blas_thread()
+def bands_about(images: Iterable[list[DotsOfOctave]], most: int | None = None) -> Bands:
+    """Return the bands about dots of images; where `most` is given, of so many of an octave.
+
+    These are the clearest ones.
+    """
     found = [_bands(np.zeros((2, 2), np.float32), NO_FITS, 0)]
     for index, image in enumerate(images):
-        check_image(image)
-        pyramid = image_pyramid(as_gray(image), settings.max_radius)
-        for octave in octaves(pyramid, *settings.radii):
+        for octave, dots in image:
             gray = octave.pyramid.gray
-            searches = whole_dots, voted_dots
-            kind = *octave.radii, settings.polarities
-            dots = [_fit(gray, search(octave.pyramid, *kind)) for search in searches]
-            fit = Fit.joined([of.select(of.share >= ENOUGH) for of in dots])
-            in_gray, in_light = _bands(gray, fit, index)
-            found.append((_enlarged(in_gray, octave.level), _enlarged(in_light, octave.level)))
+            # Those with the largest share of an outline come first.
+            fits = [_fit(gray, of.select(slice(most and _TRIED * most))) for of in dots]
+            fit = Fit.joined([of.select(of.share >= ENOUGH) for of in fits])
+            clearest = np.argsort(-fit.share * (1 - fit.contrast), kind='stable')[:most]
+            fit = fit.select(np.sort(clearest))
+            for start in range(0, len(fit.frames), _PART):
+                part = fit.select(slice(start, start + _PART))
+                in_gray, in_light = _bands(gray, part, index)
+                found.append((_enlarged(in_gray, octave.level), _enlarged(in_light, octave.level)))
     return _distinct(_most_circular(*map(Bands.joined, zip(*found, strict=True))))
 
 

@@ -13,6 +13,7 @@ edges of any height. Their sum over a target is the log odds of a word against n
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -116,8 +117,8 @@ class Evidence(ArrayRecord):
         )
 
 
-def growth_by(shift: float, size: np.ndarray) -> np.ndarray:
-    """Return the growth of dots of radii (k,) by a shift of edges, both px, in dot radii, (k,)."""
+def growth_by(shift: float | np.ndarray, size: np.ndarray) -> np.ndarray:
+    """Return the growth of dots of radii (k,) by shifts of edges, both px, in dot radii, (k,)."""
     return np.clip(shift / size, -_MAXIMUM_GROWTH, _MAXIMUM_GROWTH)
 
 
@@ -161,7 +162,7 @@ def edge_evidence(
     edges = light_edges(polar, radius, growth, inner)
     ground_at = np.stack([inner - before, outer + beside])
     band_at = np.stack([inner + within, outer - within])
-    ground, inside = (np.stack([polar.at(of) for of in at], axis=1) for at in (ground_at, band_at))
+    ground, inside = (polar.at(of).swapaxes(0, 1) for of in (ground_at, band_at))
     # Shares of ink on ground and band, without marks and with them.
     bare = [_blurred(polar, at, -np.inf, radius + growth) for at in (ground_at, band_at)]
     marked = [
@@ -238,9 +239,10 @@ def light_edges(
 ) -> np.ndarray:
     """Return the probabilities of an edge of light between neighbours, as gaps show it, (k,)."""
     start, width = radius + growth, inner - radius - growth
-    near, far = (polar.logs(polar.at(start + part * width)) for part in _ACROSS)
-    noise = np.hypot(near[1], far[1])
-    many = (np.abs(near[0] - far[0]) > np.hypot(LIGHT_EDGE, 2 * noise)).mean(axis=1)
+    across = polar.at(start + np.multiply.outer(_ACROSS, width)).swapaxes(0, 1)
+    level, noise = polar.logs(across)
+    step = np.abs(level[:, 0] - level[:, 1])
+    many = (step**2 > LIGHT_EDGE**2 + 4 * (noise**2).sum(axis=1)).mean(axis=1)
     return np.clip(many, *SURPRISES)
 
 
@@ -396,8 +398,8 @@ def _predicted(best: np.ndarray, weight: np.ndarray) -> np.ndarray:
     ahead, behind = np.zeros_like(gain), np.zeros_like(gain)
     count = len(gain)
     for step in range(1 - count, count):
-        ahead[step] = np.clip(ahead[step - 1], -price, 0) + gain[step]
-        behind[-step - 1] = np.clip(behind[-step] + gain[-step], 0, price)
+        ahead[step] = np.minimum(np.maximum(ahead[step - 1], -price), 0) + gain[step]
+        behind[-step - 1] = np.minimum(np.maximum(behind[-step] + gain[-step], 0), price)
     return np.moveaxis(ahead + behind <= 0, 0, 2)
 
 
@@ -405,10 +407,10 @@ def _surprise(errors: np.ndarray, width: np.ndarray, which: np.ndarray) -> np.nd
     """Return the probabilities that nothing predicts a level, as ground shows them, (k, 1, 1)."""
     outside = (np.abs(errors) > _UNLIKELY * width) & which
     share = outside.sum(axis=(1, 2)) / np.maximum(which.sum(axis=(1, 2)), 1)
-    return np.clip(share, *SURPRISES)[:, None, None]
+    return np.clip(share, *SURPRISES).astype(np.float32)[:, None, None]
 
 
 def normal(values: np.ndarray, spread: np.ndarray) -> np.ndarray:
     """Return the densities of values under normal distributions about 0."""
-    density: np.ndarray = np.exp(-0.5 * (values / spread) ** 2) / (spread * np.sqrt(2 * np.pi))
+    density: np.ndarray = np.exp(-0.5 * (values / spread) ** 2) / (spread * math.sqrt(2 * math.pi))
     return density

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -57,8 +57,10 @@ class PolarImages(ArrayRecord):
 
     Attributes
     ----------
-    gray : ndarray of float32, shape (k, m, n)
-        Black is lifted, see `ahf_ros.imaging.black`.
+    gray : ndarray of float32, shape (i, m, n)
+        Of i images; black is lifted, see `ahf_ros.imaging.black`.
+    row : ndarray of int, shape (k,)
+        Which of these images is that of a dot.
     reach : ndarray of float64, shape (k, m)
         Up to which radius the image shows the target at an angle, dot radii.
     outermost : ndarray of float64, shape (k,)
@@ -81,6 +83,7 @@ class PolarImages(ArrayRecord):
     """
 
     gray: np.ndarray
+    row: np.ndarray
     reach: np.ndarray
     outermost: np.ndarray
     polarity: np.ndarray
@@ -97,14 +100,23 @@ class PolarImages(ArrayRecord):
         """Radii of the circles, dot radii, shape (k, n)."""
         return np.linspace(_INNERMOST, self.outermost, self.gray.shape[2], axis=1)
 
+    def select(self, which: np.ndarray | slice) -> PolarImages:
+        """Return some of the dots; their images are those of all, which are not copied."""
+        whole = replace(self, gray=self.row)
+        return replace(ArrayRecord.select(whole, which), gray=self.gray)
+
+    def repeated(self, times: int) -> PolarImages:
+        """Return all dots several times, one time after the other."""
+        return self.select(np.tile(np.arange(len(self.row)), times))
+
     def at(self, radii: np.ndarray) -> np.ndarray:
-        """Return gray values on a circle of each dot, of radii (k,) in dot radii, shape (k, m)."""
+        """Return gray values on circles of dots, of radii (..., k) in dot radii, (..., k, m)."""
         spacing = (self.outermost - _INNERMOST) / (self.gray.shape[2] - 1)
         place = np.clip((radii - _INNERMOST) / spacing, 0, self.gray.shape[2] - 1.001)
         below = place.astype(np.intp)
-        rows, share = np.arange(len(place)), (place - below).astype(np.float32)[:, None]
-        values: np.ndarray = self.gray[rows, :, below] * (1 - share)
-        values += self.gray[rows, :, below + 1] * share
+        share = (place - below).astype(np.float32)[..., None]
+        values: np.ndarray = self.gray[self.row, :, below] * (1 - share)
+        values += self.gray[self.row, :, below + 1] * share
         return values
 
     def inked(self, paper: np.ndarray, seen: np.ndarray) -> np.ndarray:
@@ -167,6 +179,7 @@ def polar_images(
     shade = np.where(dots.polarity > 0, shade, np.float32(0))
     return PolarImages(
         gray=values,
+        row=np.arange(len(values)),
         reach=_reach(gray.shape, dots.frames, angles, radii),
         outermost=np.full(len(values), outermost),
         polarity=dots.polarity,

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -32,8 +33,7 @@ _NARROW = 3.0  # width of a gap, px, that edges of a half do not show on both of
 _PER_SECTOR, _CIRCLES = 5, 36  # angles of the shortest sectors, and circles
 _PHASES = 4  # of the sectors
 _MAXIMUM_SHIFT = 1.2  # of edges, px
-_SHIFTS, _OF_NARROW = 3, 7  # that are tried; readings keep farther from edges than what is left
-_WIDE = 1.0  # width of a band, dot radii
+_SHIFTS = 7  # that are tried; readings keep farther from edges than what is left
 _COVER = 5.0  # price of a sector that is covered, less than where words are decoded
 _CAP = 3.0  # evidence of a reading against bare paper
 _ALIKE, _BEYOND = 0.15, 0.5  # difference of ln, and share of what is beyond, that show a hole
@@ -99,18 +99,18 @@ def measure_likely(
 ) -> tuple[Fit, Fit]:
     """Return better fits of the dots whose bands are worth reading, and those of the others.
 
-    Without families, all dots are worth it.
+    The most hopeful dots come first. Without families, all dots are worth it.
     """
-    worth, others = [NO_FITS], [NO_FITS]
-    for start in range(0, len(dots.frames), PART):
-        part = dots.select(slice(start, start + PART))
-        if families is not None:
-            likely = may_be_targets(gray, part, families)
-            others.append(part.select(~likely))
-            part = part.select(likely)
-        worth.append(_fit(gray, part))
-    fit = Fit.joined(worth)
-    return fit.select(fit.share >= ENOUGH), Fit.joined(others)
+    others = NO_FITS
+    if families is not None:
+        hope = hopes(gray, dots, families)
+        order = np.argsort(-hope, kind='stable')
+        number = np.count_nonzero(hope > HOPEFUL)
+        others = dots.select(order[number:])
+        dots = dots.select(order[:number])
+    parts = (dots.select(slice(start, start + PART)) for start in range(0, len(dots.frames), PART))
+    fit = Fit.joined([NO_FITS, *(_fit(gray, part) for part in parts)])
+    return fit.select(fit.share >= ENOUGH), others
 
 
 def _fit(gray: np.ndarray, dots: Dots | Fit, *, covariances: bool = True) -> Fit:
@@ -127,11 +127,14 @@ def _fit(gray: np.ndarray, dots: Dots | Fit, *, covariances: bool = True) -> Fit
     )
 
 
-def may_be_targets(gray: np.ndarray, dots: Fit, families: Sequence[Family]) -> np.ndarray:
-    """Return whether dots may be the middles of targets of any family, shape (k,)."""
+def hopes(gray: np.ndarray, dots: Fit, families: Sequence[Family]) -> np.ndarray:
+    """Return bounds of the mean evidence of readings for words of any family, shape (k,).
+
+    Where few marks may be all that a word has, they are raised by as much.
+    """
     prints = list(dict.fromkeys((code.band, code.bits) for code in families))
     least = min(1.0, *(least_marked(code) / FEW_MARKS for code in families))
-    return np.asarray(bounds(gray, dots, prints).max(axis=0) > least * HOPEFUL)
+    return np.asarray(bounds(gray, dots, prints).max(axis=0) / least)
 
 
 def bounds(
@@ -161,20 +164,22 @@ def _bounds(
     """Return the same for some numbers of sectors in one band, shape (numbers, k)."""
     angles = _PER_SECTOR * max(bits)
     polar = polar_images(gray, dots, band, angles, _CIRCLES)
-    best = np.full((len(bits), len(dots.frames)), -np.inf)
-    tried = _SHIFTS if band[1] - band[0] >= _WIDE else _OF_NARROW
-    for shift in shifts or np.linspace(-_MAXIMUM_SHIFT, _MAXIMUM_SHIFT, tried).tolist():
-        growth = growth_by(shift, polar.size)
-        edges = edge_evidence(polar, 1 - growth, growth, band)
-        holes = _holes(polar, band_edges(1 - growth, growth, band)[1])
-        cap = _CAP * edges.weight[:, None]
-        for index, count in enumerate(bits):
-            paper, ink = (_of_sectors(of.sum(axis=1), count) for of in (edges.paper, edges.ink))
-            of_word = np.maximum(np.maximum(paper, ink), -_COVER).sum(axis=2)
-            marked = _of_sectors(np.clip((edges.ink - edges.paper).sum(axis=1), -cap, cap), count)
-            bound = np.minimum(of_word, np.maximum(marked, 0).sum(axis=2)).max(axis=1)
-            bound = np.where(holes, -np.inf, bound / (angles * edges.weight))
-            best[index] = np.maximum(best[index], bound)
+    tried = shifts or np.linspace(-_MAXIMUM_SHIFT, _MAXIMUM_SHIFT, _SHIFTS)
+    every = polar.repeated(len(tried))
+    growth = growth_by(np.repeat(tried, len(polar.size)), every.size)
+    edges = edge_evidence(every, 1 - growth, growth, band)
+    holes = _holes(every, band_edges(1 - growth, growth, band)[1])
+    cap = _CAP * edges.weight[:, None]
+    marked = np.clip((edges.ink - edges.paper).sum(axis=1), -cap, cap)
+    looks = np.stack([edges.paper.sum(axis=1), edges.ink.sum(axis=1), marked], axis=1)
+    best = np.empty((len(bits), len(dots.frames)))
+    for index, count in enumerate(bits):
+        sectors = (looks @ _sectors(angles, count)).reshape(*looks.shape[:2], _PHASES, count)
+        paper, ink, marked = sectors.swapaxes(0, 1)
+        of_word = np.maximum(np.maximum(paper, ink), -_COVER).sum(axis=2)
+        bound = np.minimum(of_word, np.maximum(marked, 0).sum(axis=2)).max(axis=1)
+        bound = np.where(holes, -np.inf, bound / (angles * edges.weight))
+        best[index] = bound.reshape(len(tried), -1).max(axis=0)
     return best
 
 
@@ -183,25 +188,26 @@ def _holes(polar: PolarImages, outer: np.ndarray) -> np.ndarray:
 
     From the radii of the outer edges of the bands, (k,).
     """
+    bright = np.flatnonzero(polar.polarity < 0)
+    holes = np.zeros(len(outer), bool)
+    if not bright.size:
+        return holes
+    polar, outer = polar.select(bright), outer[bright]
     inside, outside = (
-        np.stack([polar.logs(polar.at(radius))[0] for radius in radii], axis=1)
-        for radii in (DOT[:, None] * np.ones_like(outer), outer + MARGIN[:, None])
+        polar.logs(polar.at(radius).swapaxes(0, 1))[0]
+        for radius in (DOT[:, None] * np.ones_like(outer), outer + MARGIN[:, None])
     )
     alike = np.abs(outside - np.median(inside, axis=(1, 2), keepdims=True)) < _ALIKE
-    return np.asarray((polar.polarity < 0) & (alike.mean(axis=2) > _BEYOND).all(axis=1))
+    holes[bright] = (alike.mean(axis=2) > _BEYOND).all(axis=1)
+    return holes
 
 
-def _of_sectors(values: np.ndarray, bits: int) -> np.ndarray:
-    """Return the sums of values (k, m) over sectors at some phases, shape (k, phases, bits)."""
-    count = values.shape[1]
-    sums = np.cumsum(np.concatenate([values, values], axis=1), axis=1, dtype=np.float64)
+@lru_cache(maxsize=32)
+def _sectors(count: int, bits: int) -> np.ndarray:
+    """Return the shares of angles in sectors at some phases, float32, (count, phases bits)."""
     starts = (np.arange(_PHASES)[:, None] / _PHASES + np.arange(bits)) * count / bits
-    ends = starts + count / bits
-
-    def until(places: np.ndarray) -> np.ndarray:
-        """Return the integral from the first value to places, of steps of width 1."""
-        below = places.astype(np.intp)
-        before = np.where(below > 0, sums[:, np.maximum(below - 1, 0)], 0.0)
-        return before + (places - below) * (sums[:, below] - before)
-
-    return until(ends) - until(starts)
+    angles = np.arange(2 * count)[:, None, None]
+    inside = np.clip(
+        np.minimum(starts + count / bits, angles + 1) - np.maximum(starts, angles), 0, 1
+    )
+    return (inside[:count] + inside[count:]).reshape(count, -1).astype(np.float32)

@@ -107,19 +107,16 @@ def best_growth(
 
     In the dot radii of the image; a dot that is seen with radius 1 was printed with less.
     """
-    polar = replace(polar, gray=polar.gray[:, ::2], reach=polar.reach[:, ::2])
-    best = np.full(len(polar.size), -np.inf)
-    growth = np.zeros(len(polar.size))
-    for shift in _SHIFTS:
-        tried = growth_by(shift, polar.size)
-        edges = edge_evidence(polar, 1 - tried, tried, band)
-        paper, ink = edges.paper.sum(axis=1), edges.ink.sum(axis=1)
-        # Any ground is as even as paper somewhere, but only a band has ink.
-        score = np.maximum(ink - np.maximum(paper, 0), 0).sum(axis=1)
-        unusual = (polar.polarity * shift - prior.shift) / prior.deviation
-        score = score - 0.5 * unusual**2
-        growth = np.where(score > best, tried, growth)
-        best = np.maximum(score, best)
+    half = replace(polar, gray=polar.gray[:, ::2], reach=polar.reach[:, ::2])
+    every = half.repeated(len(_SHIFTS))
+    tried = growth_by(np.repeat(_SHIFTS, len(polar.size)), every.size)
+    edges = edge_evidence(every, 1 - tried, tried, band)
+    paper, ink = edges.paper.sum(axis=1), edges.ink.sum(axis=1)
+    # Any ground is as even as paper somewhere, but only a band has ink.
+    score = np.maximum(ink - np.maximum(paper, 0), 0).sum(axis=1).reshape(len(_SHIFTS), -1)
+    unusual = (np.multiply.outer(_SHIFTS, polar.polarity) - prior.shift) / prior.deviation
+    best = (score - 0.5 * unusual**2).argmax(axis=0)
+    growth: np.ndarray = tried.reshape(score.shape)[best, np.arange(len(best))]
     return growth
 
 

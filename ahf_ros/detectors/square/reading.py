@@ -44,6 +44,8 @@ _POSSIBLE = -12.0  # minimum of these odds where all is as usual but a corner or
 _CLEAR = -6.0  # maximum of the odds of other markers where these odds are low
 _PLAIN = 0.35  # logarithmic odds against a marker, for each edge less than random cells have
 
+_ERF = np.frompyfunc(erf, 1, 1)
+
 MINIMUM_ODDS = 2.2
 """Logarithmic odds of a marker that is reported: nine to one."""
 
@@ -251,7 +253,7 @@ def _unmixed(values: np.ndarray, corners: np.ndarray, side: int, blurs: np.ndarr
     neighbours = np.eye(count, k=1) + np.eye(count, k=-1)
     neighbours[0, 0] = neighbours[-1, -1] = 1
     across, down = (
-        np.array([(1 - erf(share / (2 * sqrt(2)))) / 2 for share in of / blurs])
+        (1 - _ERF(of / blurs / (2 * sqrt(2))).astype(np.float64)) / 2
         for of in ((lengths[:, 0] + lengths[:, 2]) / 2, (lengths[:, 1] + lengths[:, 3]) / 2)
     )
     mixed = [
