@@ -94,7 +94,7 @@ def test_names_lie_in_modules_functions_and_tuples() -> None:
 def test_an_expression_stands_for_a_constant_a_function_or_a_part_of_one() -> None:
     source = 'A, B = 1, 2\ndef f(x):\n    good = x > A\n    return good\ndef g():\n    return B\n'
     tree = ast.parse(source)
-    for name, expression in (('B', '5'), ('f.good', 'x'), ('g', 'lambda: A + B')):
+    for name, expression in (('B', '3 + ORIGINAL'), ('f.good', 'x'), ('g', 'lambda: A + B')):
         replace(tree, name, expression)
     made: dict = {}
     tree = ast.fix_missing_locations(tree)
