@@ -22,7 +22,7 @@ MAXIMUM_ID = 2**31 - 1
 """Maximum ID, as in the message."""
 
 MAXIMUM_LENGTH_PX = 65536.0
-"""Maximum size of a coordinate or a semi-axis, px: twice the side of the largest image."""
+"""Maximum size of a coordinate or a semi-axis, px: more than the side of the largest image."""
 
 _MAXIMUM_COUNT = 100_000  # of targets in a result
 _MAXIMUM_TEXT = 200  # characters of the name of a family

@@ -31,7 +31,7 @@ def change(place: str, expression: str) -> None:
         Name of the module, a dot, and that of the constant or function. After a colon instead of
         the dot, the name may lie in functions or classes: `module:function.local`.
     expression : str
-        What the name is assigned instead, Python.
+        What the name is assigned instead, Python, in which `ORIGINAL` is what it is assigned now.
     """
     module, _, name = place.rpartition(':' if ':' in place else '.')
     compiled = SourceFileLoader.get_code
@@ -100,12 +100,24 @@ def assigned(scope: Scope) -> dict[str, Callable[[ast.expr], None]]:
 
 def replace_value(node: ast.Assign | ast.AnnAssign, value: ast.expr) -> None:
     """Let a statement assign another value."""
-    node.value = value
+    assert node.value is not None
+    node.value = _Original(node.value).visit(value)
 
 
 def replace_element(values: ast.Tuple, number: int, value: ast.expr) -> None:
     """Let one of several values be another one."""
-    values.elts[number] = value
+    values.elts[number] = _Original(values.elts[number]).visit(value)
+
+
+class _Original(ast.NodeTransformer):
+    """Put what a name is assigned now in the place of `ORIGINAL`."""
+
+    def __init__(self, value: ast.expr) -> None:
+        self.value = value
+
+    def visit_Name(self, node: ast.Name) -> ast.expr:
+        """Return what stands for a name."""
+        return self.value if node.id == 'ORIGINAL' else node
 
 
 def results(folder: Path) -> dict[str, Any]:

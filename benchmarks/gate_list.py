@@ -21,7 +21,7 @@ class Gate:
     place : str
         Module and name within `ahf_ros`, `module:NAME` or `module:function.local`.
     opened : str
-        Expression with which it does nothing, or nearly.
+        Expression with which it does nothing, or nearly; `ORIGINAL` is its value.
     """
 
     about: str
@@ -32,17 +32,20 @@ class Gate:
 _NEVER, _EVERY = "float('-inf')", "float('inf')"
 
 
-def _windows(*shares: float) -> str:
-    """Return the rounds of the fit of ellipses with other least shares of inliers."""
-    wide, middle, narrow = shares
-    return f'((0.5, {wide}, 2), (0.3, {middle}, 1), (0.15, {narrow}, 1))'
+def _without_shares(*rounds: int) -> str:
+    """Return the rounds of the fit of ellipses, some without a least share of inliers."""
+    return (
+        f'[(size, -1 if number in {rounds} else share, every) '
+        'for number, (size, share, every) in enumerate(ORIGINAL)]'
+    )
 
 
 def _confidence_without(feature: int) -> str:
     """Return the weights of the confidence of rings without that of one feature."""
-    weights = "np.concatenate(read_weights(WEIGHTS, 'confidence', 'intercept', 'weights'))"
-    return f'np.where(np.arange(8) == {feature}, 0.0, {weights})'
+    return f'np.where(np.arange(8) == {feature}, 0.0, ORIGINAL)'
 
+
+_HALF_THE_VOTES = 'ORIGINAL._replace(votes=ORIGINAL.votes / 2)'
 
 _EDGES = [
     Gate('edges without a strong part', 'features.log_edges:_STRONG_EDGE', '0.15'),
@@ -50,22 +53,20 @@ _EDGES = [
 ]
 
 _VOTED = [
-    Gate(
-        'few votes: dots of 2 to 3.4 px', 'features.candidates:_TINY', '_Shape(1.0, 1, 1, 0.3, 1)'
-    ),
-    Gate('few votes: to 5.8 px', 'features.candidates:_SMALL', '_Shape(1.0, 1, 1, 0.7, 1)'),
-    Gate('few votes: larger', 'features.candidates:_LARGE', '_Shape(1.0, 1, 2, 0.7, 1)'),
-    Gate('few votes: oblique', 'features.candidates:_OBLIQUE', '_Shape(0.5, 6, 2, 0.6, 2)'),
-    Gate('few votes: steep', 'features.candidates:_STEEP', '_Shape(0.3, 8, 2, 0.6, 2)'),
+    Gate('few votes: dots of 2 to 3.4 px', 'features.candidates:_TINY', _HALF_THE_VOTES),
+    Gate('few votes: to 5.8 px', 'features.candidates:_SMALL', _HALF_THE_VOTES),
+    Gate('few votes: larger', 'features.candidates:_LARGE', _HALF_THE_VOTES),
+    Gate('few votes: oblique', 'features.candidates:_OBLIQUE', _HALF_THE_VOTES),
+    Gate('few votes: steep', 'features.candidates:_STEEP', _HALF_THE_VOTES),
     Gate('blocks of few votes', 'features.candidates:_SPREAD', '0.0'),
     Gate('few votes of the cell itself', 'features.candidates:_OWN', '0.0'),
     Gate('cells beside one with more votes', 'features.candidates:_REACH', '0.0'),
     Gate('too many candidates', 'features.candidates:MAXIMUM_CANDIDATES', '10**9'),
     Gate('low steps about a candidate', 'features.ellipses:_MINIMUM_SCORE', '-1.0'),
-    Gate('share of inliers, first round', 'features.ellipses:_WINDOWS', _windows(-1, 0.45, 0.55)),
-    Gate('second round', 'features.ellipses:_WINDOWS', _windows(0.35, -1, 0.55)),
-    Gate('third round', 'features.ellipses:_WINDOWS', _windows(0.35, 0.45, -1)),
-    Gate('all rounds', 'features.ellipses:_WINDOWS', _windows(-1, -1, -1)),
+    Gate('share of inliers, first round', 'features.ellipses:_WINDOWS', _without_shares(0)),
+    Gate('second round', 'features.ellipses:_WINDOWS', _without_shares(1)),
+    Gate('third round', 'features.ellipses:_WINDOWS', _without_shares(2)),
+    Gate('all rounds', 'features.ellipses:_WINDOWS', _without_shares(0, 1, 2)),
     Gate('flat ellipses', 'features.ellipses:_MINIMUM_ASPECT', '0.0'),
     Gate('narrow ellipses', 'features.ellipses:_MINIMUM_MINOR', '0.0'),
     Gate('ellipses beyond their range', 'features.ellipses:_OVERSIZE', _EVERY),
@@ -111,8 +112,14 @@ RING = [
     Gate('words after the best ones', 'detectors.ring.codewords:COMPETITORS', '96'),
     Gate('readings without hope', 'detectors.ring.likelihood:HOPEFUL', _NEVER),
     Gate(
+        'rivals whose bound is low',
+        'detectors.ring.rivals:word_ceilings',
+        'lambda gray, dots, band, numbers, prior: '
+        'np.full((len(numbers), len(dots.frames)), np.inf)',
+    ),
+    Gate(
         'words that rivals beat',
-        'detectors.ring.families:_against_rivals',
+        'detectors.ring.rivals:against_rivals',
         'lambda gray, dots, found, families, prior: found',
     ),
     Gate(
@@ -246,7 +253,7 @@ SQUARE = [
 
 CCTAG = [
     Gate('circles: low steps', 'features.ellipses:_MINIMUM_SCORE', '-1.0'),
-    Gate('circles: all rounds', 'features.ellipses:_WINDOWS', _windows(-1, -1, -1)),
+    Gate('circles: all rounds', 'features.ellipses:_WINDOWS', _without_shares(0, 1, 2)),
     Gate('too many faint edges', 'detectors.cctag.detector:_MOST_FAINT', '1.0'),
     Gate('glance: little explained', 'detectors.cctag.glance:_PROMISING', '0.0'),
     Gate('glance: worse frames', 'detectors.cctag.glance:_LOOKED_AT', '8'),

@@ -329,10 +329,10 @@ HEAD = (
 )
 
 
-def page(
+def measured(
     detector: str, named: dict[str, Picture], gates: Sequence[Gate], folder: Path
-) -> list[str]:
-    """Return the lines of the table of some gates of a detector."""
+) -> report.Report:
+    """Return the figures of some gates of a detector as JSON has them."""
     closed = seen(folder)
     rows = []
     for gate in report.progress(gates, detector):
@@ -340,15 +340,36 @@ def page(
         made = difference(closed, opened, named)
         rows.append(row(gate, made, len(closed.keys() & opened.keys()), len(named)))
         print(' | '.join(rows[-1]), *made.pictures, sep='\n    ', file=sys.stderr, flush=True)
-    right = sum(len(of.right) for of in closed.values())
-    bad = sum(of.wrong + of.false for of in closed.values())
-    targets = sum(len(picture.truth) for picture in named.values())
-    calls = sum(of.calls for of in closed.values())
-    about = (
-        f'`{detector}`: {len(named)} pictures. With all gates closed {right} of {targets} targets '
-        f'are right and {bad} reports wrong or false, with {calls:,} calls.'
-    )
-    return [about, '', *report.table(HEAD, rows), '']
+    return {
+        'detector': detector,
+        'pictures': [picture.name for picture in named.values()],
+        'targets': sum(len(picture.truth) for picture in named.values()),
+        'right': sum(len(of.right) for of in closed.values()),
+        'wrong or false': sum(of.wrong + of.false for of in closed.values()),
+        'calls': sum(of.calls for of in closed.values()),
+        'rows': rows,
+    }
+
+
+def markdown(figures: report.Report) -> str:
+    """Return the page of a report."""
+    lines = [f'Commit {figures["commit"]}. {report.about_text(figures)}']
+    for of in figures['detectors']:
+        about = (
+            f'`{of["detector"]}`: {len(of["pictures"])} pictures. As it is, {of["right"]} of '
+            f'{of["targets"]} targets are right and {of["wrong or false"]} reports wrong or '
+            f'false, with {of["calls"]:,} calls.'
+        )
+        shown = f'Pictures: {", ".join(of["pictures"])}.'
+        lines += ['', about, '', *report.table(HEAD, of['rows']), '', shown]
+    return '\n'.join(lines)
+
+
+def commit() -> str:
+    """Return what the sources are, as git names it; 'unknown' where there is no git."""
+    command = ['git', 'describe', '--always', '--dirty']
+    done = subprocess.run(command, cwd=ROOT, check=False, capture_output=True, text=True)
+    return done.stdout.strip() or 'unknown'
 
 
 def main() -> None:
@@ -359,7 +380,7 @@ def main() -> None:
     parser.add_argument('--pictures', nargs='+', default=[], metavar='TEXT', help='default: all')
     parser.add_argument('--yardstick', type=Path, default=YARDSTICK, metavar='FOLDER')
     options = report.parsed(parser)
-    lines = []
+    found = []
     for detector in options.detectors:
         some = list(pictures(detector, options.seeds, options.yardstick, options.pictures))
         gates = [it for it in GATES[detector] if chosen(f'{it.about} {it.place}', options.gates)]
@@ -367,11 +388,9 @@ def main() -> None:
             continue
         with tempfile.TemporaryDirectory() as folder:
             named = written(some, Path(folder))
-            lines += page(detector, named, gates, Path(folder))
-    text = '\n'.join(lines)
-    if options.output:
-        Path(f'{options.output}.md').write_text(text)
-    print(text)
+            found.append(measured(detector, named, gates, Path(folder)))
+    figures = report.about(options.seeds, commit=commit(), detectors=found)
+    report.publish(figures, markdown(figures), options)
 
 
 if __name__ == '__main__':

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any
-
-import cv2
 import numpy as np
 
-_NO_MAP: Any = None  # coordinates come as pairs in one map
+from ahf_ros.imaging.resampling import remapped
+
 _REMAP_ROWS = 16384  # cv2.remap takes maps of at most 32767 rows
 
 
@@ -22,7 +20,7 @@ def sample(image: np.ndarray, pixels: np.ndarray) -> np.ndarray:
     values = np.empty(maps.shape[:2], image.dtype)
     for start in range(0, len(maps), _REMAP_ROWS):
         rows = slice(start, start + _REMAP_ROWS)
-        values[rows] = _remapped(image, maps[rows], _NO_MAP)
+        values[rows] = remapped(image, maps[rows], None)
     return values.reshape(pixels.shape[:-1])
 
 
@@ -40,7 +38,7 @@ def sample_lines(
     values = np.empty((len(middles), len(along)), image.dtype)
     for start in range(0, len(values), _REMAP_ROWS):
         rows = slice(start, start + _REMAP_ROWS)
-        values[rows] = _remapped(
+        values[rows] = remapped(
             image, x[rows] + across[rows] * along, y[rows] + down[rows] * along
         )
     return values
@@ -71,7 +69,7 @@ def sample_circles(
         for points in (across, down) if scale else ():
             points /= scale[0]
         shape = (across.shape[0] * across.shape[1], -1)
-        sampled = _remapped(image, across.reshape(shape), down.reshape(shape))
+        sampled = remapped(image, across.reshape(shape), down.reshape(shape))
         values[part] = sampled.reshape(across.shape)
     return values
 
@@ -80,7 +78,3 @@ def within(pixels: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
     """Return whether pixels, shape (..., 2), lie in an image of shape (height, width)."""
     x, y = pixels[..., 0], pixels[..., 1]
     return (x >= 0) & (y >= 0) & (x <= shape[1] - 1) & (y <= shape[0] - 1)
-
-
-def _remapped(image: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    return cv2.remap(image, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)

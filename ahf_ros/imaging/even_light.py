@@ -16,6 +16,8 @@ from collections.abc import Iterable
 import cv2
 import numpy as np
 
+from ahf_ros.imaging.resampling import remapped
+
 _BLUR = 1.0  # px, of the images before their ratio is taken, against noise
 _RANKS = 3  # images that ratios are taken of: the brightest ones of each point
 _BINS = 24  # of each ratio, from 0 to 1
@@ -48,9 +50,7 @@ def even_light(images: Iterable[np.ndarray]) -> np.ndarray:
     logarithm = cv2.log(largest + np.float32(_FLOOR))
     table, full = _brightness(logarithm - _surroundings(logarithm), ratios)
     places = [of * np.float32(_BINS) - np.float32(0.5) for of in ratios]
-    excess = cv2.remap(
-        table, places[1], places[0], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
-    )
+    excess = remapped(table, places[1], places[0])
     low, high = _ALIKE
     alike = (ratios[0] - np.float32(low)) / np.float32(high - low)
     np.clip(alike, 0, 1, out=alike)

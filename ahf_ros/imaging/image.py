@@ -19,7 +19,7 @@ GAMMA = 2.2
 IMAGE_TYPES = (np.uint8, np.uint16, np.float32, np.float64)
 """Accepted pixel types, in the byte order of the machine."""
 
-_MAXIMUM_SIDE = 32767  # px; OpenCV resamples no larger image
+_MAXIMUM_SIDE = 65_500  # px; JPEG files have no longer ones
 _MAXIMUM_PIXELS = 2**28  # a filter takes some 30 bytes for each
 _HOT_SHARE = 100_000  # one pixel in so many may be brighter than any light in the image
 _MUCH_WHITE = 0.3  # share of an image

@@ -20,6 +20,7 @@ import numpy as np
 from ahf_ros.blas import one_blas_thread
 from ahf_ros.imaging.image import as_gray
 from ahf_ros.imaging.logarithm import LOG_OFFSET
+from ahf_ros.imaging.resampling import remapped
 from ahf_ros.target import UNDECODED, Target
 
 _SIGNIFICANT = 6.0  # standard deviations from zero, a displacement that is movement
@@ -287,7 +288,7 @@ def _profiles(
     rows = (y[:, None] + normals[:, 1:] * offsets).astype(np.float32)
     if not len(x):
         return columns
-    across, down = (cv2.remap(of, columns, rows, cv2.INTER_LINEAR) for of in gradients)
+    across, down = (remapped(of, columns, rows, cv2.BORDER_CONSTANT) for of in gradients)
     along: np.ndarray = across * normals[:, :1] + down * normals[:, 1:]
     return along
 

@@ -94,7 +94,7 @@ def test_names_lie_in_modules_functions_and_tuples() -> None:
 def test_an_expression_stands_for_a_constant_a_function_or_a_part_of_one() -> None:
     source = 'A, B = 1, 2\ndef f(x):\n    good = x > A\n    return good\ndef g():\n    return B\n'
     tree = ast.parse(source)
-    for name, expression in (('B', '5'), ('f.good', 'x'), ('g', 'lambda: A + B')):
+    for name, expression in (('B', '3 + ORIGINAL'), ('f.good', 'x'), ('g', 'lambda: A + B')):
         replace(tree, name, expression)
     made: dict = {}
     tree = ast.fix_missing_locations(tree)
@@ -137,3 +137,20 @@ def test_only_pictures_that_were_done_in_time_count() -> None:
     of = Picture('', np.zeros((1, 1)), (('1', 0.0, 0.0),), 'metashape12')
     made = difference(both, {'a': both['a']}, {'a': of, 'b': of})
     assert (made.targets, made.calls, made.more) == (1, 10, 10)
+
+
+def test_the_page_says_what_was_measured(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    shown = render(SCENE)
+    truth = tuple((str(it.id), it.x, it.y) for it in shown.targets)
+    picture = Picture('small scene', shown.image, truth, 'metashape12')
+    monkeypatch.setattr(gates, 'pictures', lambda *_: iter([picture]))
+    asked = ['--detectors', 'ring', '--gates', NO_MATTER.place, '--output', str(tmp_path / 'page')]
+    monkeypatch.setattr('sys.argv', ['gates', *asked])
+    gates.main()
+    text = (tmp_path / 'page.md').read_text()
+    assert text.strip() == capsys.readouterr().out.strip()
+    assert 'Commit ' in text and 'Pictures: small scene.' in text
+    assert 'As it is, 3 of 3 targets are right and 0 reports wrong or false' in text
+    assert f'`{NO_MATTER.place}` | `4` | `1` | 0 | 0 | +0 |' in text

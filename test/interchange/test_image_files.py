@@ -166,7 +166,8 @@ def test_images_that_are_too_large_are_named_before_they_are_decoded(
     wide = np.zeros((16, 40_000), np.uint8)
     (tmp_path / f'wide{suffix}').write_bytes(cv2.imencode(suffix, wide)[1].tobytes())
     monkeypatch.setattr(cv2, 'imdecode', None)
-    with pytest.raises(ValueError, match='is 40000 x 16 px, accepted are sides of at most 32767'):
+    monkeypatch.setattr('ahf_ros.imaging.image._MAXIMUM_SIDE', 30_000)
+    with pytest.raises(ValueError, match='is 40000 x 16 px, accepted are sides of at most 30000'):
         read_image(tmp_path / f'wide{suffix}')
 
 

@@ -28,6 +28,7 @@ from ahf_ros.features.ellipse_targets import targets_from_frames
 from ahf_ros.features.frame import affine_frames, circle_points, project
 from ahf_ros.features.sampling import sample, within
 from ahf_ros.imaging.image import check_image, stretched_to_8_bit
+from ahf_ros.imaging.resampling import remapped
 from ahf_ros.target import UNDECODED, Target, sorted_targets
 
 _LEVELS = 256  # of gray values
@@ -73,7 +74,7 @@ def local_otsu(gray: np.ndarray, side: int) -> np.ndarray:
     x = ((np.arange(width) + 0.5) / tile).astype(np.float32)
     y = ((np.arange(height) + 0.5) / tile).astype(np.float32)
     across, down = np.meshgrid(x, y)
-    return cv2.remap(grid, across, down, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    return remapped(grid, across, down)
 
 
 def otsu(histograms: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
