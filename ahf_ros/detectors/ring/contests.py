@@ -13,6 +13,7 @@ from ahf_ros.features import frame
 
 _CLEARLY = 2.0  # times the evidence of another claim to the same ID or dot
 _FOREIGN = 10.0  # log odds of arcs of any length against a word, which is none then
+_OTHER_COLOUR = 0.2  # of a foreign band, that a target of the other colour counts for
 _ROUND = 0.6  # share of the edges of a word that are in their place, where there is a band
 _CODED = 5.0  # odds of words against arcs of any length, before any is read
 _OVERLAP = 0.92  # of the radii of two targets, at which the paper of one hides marks of the other
@@ -24,9 +25,9 @@ def among_others(hypotheses: Hypotheses) -> Hypotheses:
 
     Targets of one image share a family. Whole bands that arcs of any length explain better than
     words, with ends anywhere, and targets that do not look like their print are foreign. Among
-    these a word is one by chance, unless more targets share its family; and it is arcs of any
-    length, unless it explains its band better. What is not certain among these speaks for no other
-    word of its family.
+    these a word is one by chance, unless more targets share its family and its colour, which most
+    targets of an image do; and it is arcs of any length, unless it explains its band better. What
+    is not certain among these speaks for no other word of its family.
     """
     arcs = (hypotheses.coded < -_FOREIGN) & (hypotheses.ends <= 0) & (hypotheses.share > _ROUND)
     arcs |= hypotheses.unlike > COVERED
@@ -41,12 +42,15 @@ def among_others(hypotheses: Hypotheses) -> Hypotheses:
 def _among(hypotheses: Hypotheses, likely: Hypotheses, foreign: np.ndarray) -> np.ndarray:
     """Return the confidence of hypotheses, by how likely each is and by foreign bands, (k,)."""
     left = hypotheses.confidence.copy()
-    for code in dict.fromkeys(hypotheses.families):
-        own = hypotheses.families == code
+    evidence = likely.certain * likely.confidence
+    kinds = [(code, sign) for code in dict.fromkeys(hypotheses.families) for sign in (1, -1)]
+    for code, sign in kinds:
+        of_family = hypotheses.families == code
+        own = of_family & (hypotheses.polarity == sign)
         sure, others = hypotheses.confidence[own], foreign[own].sum()
-        alike = (likely.certain * likely.confidence)[own]
-        alike = alike.sum() - alike + 0.5
-        by_chance = np.maximum((others + 0.5) / alike, 1)
+        unlike = _OTHER_COLOUR * evidence[of_family & ~own].sum()
+        alike = evidence[own].sum() - evidence[own] + 0.5
+        by_chance = np.maximum((others + unlike + 0.5) / alike, 1)
         as_arcs = others / alike * np.exp(-np.maximum(hypotheses.coded[own], 0)) / _CODED
         left[own] = sure / (1 + (1 - sure) * (by_chance - 1) + sure * as_arcs)
     return left
