@@ -34,16 +34,23 @@ def owners(count: int, rivals: Rivals) -> np.ndarray:
     return owning
 
 
-def leading(scores: np.ndarray, certain: np.ndarray, rivals: Rivals, times: float) -> np.ndarray:
+def leading(
+    scores: np.ndarray,
+    certain: np.ndarray,
+    rivals: Rivals,
+    times: float,
+    lead: float = np.inf,
+) -> np.ndarray:
     """Return which certain claims have at least some times the score of any certain rival.
 
-    Arrays have the shape (k,).
+    A lead over it is as good. Arrays have the shape (k,).
     """
     ahead = certain.copy()
     for index in np.flatnonzero(certain).tolist():
         others = certain & rivals(index)
         others[index] = False
-        ahead[index] = (scores[index] >= times * scores[others]).all()
+        enough = np.minimum(times * scores[others], scores[others] + lead)
+        ahead[index] = (scores[index] >= enough).all()
     return ahead
 
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from ahf_ros.detectors.claims import Rivals, leading, owners
 from ahf_ros.detectors.ring.confidence import COVERED
+from ahf_ros.detectors.ring.decoding import CLEAR
 from ahf_ros.detectors.ring.hypotheses import Hypotheses
 from ahf_ros.features import frame
 
@@ -71,7 +72,7 @@ def resolve(hypotheses: Hypotheses, ids: np.ndarray) -> tuple[np.ndarray, np.nda
         return on_it(index) & (ids != ids[index]) & (order > index)
 
     kept = owners(len(ids), on_it)
-    certain = kept & leading(seen, hypotheses.certain, against, _CLEARLY)
+    certain = kept & leading(seen, hypotheses.certain, against, _CLEARLY, CLEAR)
     sure = 1 / (1 - hypotheses.confidence + np.finfo(float).eps)
     certain = leading(sure, certain, _overlapping(hypotheses), _ON_TOP)
     return kept, leading(seen, certain, lambda index: ids == ids[index], _CLEARLY)
