@@ -19,6 +19,7 @@ from ahf_ros.features.robust import NORMAL
 WHOLE = 0.9
 """Share of the edge of a dot that is explained, or reported, without a word."""
 
+_AROUND = 0.25  # a whole dot without a word, where its own edge lies, dot radii
 _USUAL_DEVIATION = 1.0  # of the shift of edges of images, px
 _MINIMUM_DEVIATION = 0.3  # of targets of one image, which are not lit and printed alike, px
 _MINIMUM_TARGETS = 3  # certain targets that tell the shift of an image
@@ -56,7 +57,7 @@ class Explained(ArrayRecord):
         explained = certain | (read.share >= WHOLE)
         read, certain = read.select(explained), certain[explained]
         _, minor, _ = frame.ellipse_axes(read.frames)
-        radii = np.where(certain, read.reach / minor, 1.0) + REACH
+        radii = np.where(certain, read.reach / minor + REACH, 1.0 + _AROUND)
         outlines = frame.circle_outlines(read.frames, radii)
         return Explained(
             *(read.frames, outlines, radii * minor, certain, read.clear, read.edge_shift)
