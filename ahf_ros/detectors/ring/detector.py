@@ -189,7 +189,9 @@ def read_pyramid(
             shown = [by_name[code.name] for code in shown]
             shown = shown or choose_families(part, dots, families)
             codes = shown or families[:1]
-            likely, others = measure_likely(part, dots, None if every else codes)
+            likely, others = NO_FITS, dots
+            if shown or every:
+                likely, others = measure_likely(part, dots, None if every else codes)
             unread = Hypotheses.unread(others, families[0])
             seen = seen.after(at_full_size(images[: octave.level + 1], unread))
             seen = _read(octave, images, likely, codes, seen, expected, every=every)

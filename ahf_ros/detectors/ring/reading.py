@@ -73,6 +73,8 @@ def _read_part(gray: np.ndarray, dots: Fit, family: Family, prior: Prior) -> Hyp
     edges = edge_evidence(polar, 1 - growth, growth, family.band, SHARES)
     words = decode(edges, _overhang(growth, family), family, prior.expected)
     read = np.flatnonzero(_mean_odds(words, edges.weight) > hopeful)
+    if not read.size:
+        return unread
     edges, growth = edges.select(read), growth[read]
     printed = dots.select(read)
     printed = replace(printed, frames=frame.scaled(printed.frames, 1 - growth))
@@ -81,6 +83,8 @@ def _read_part(gray: np.ndarray, dots: Fit, family: Family, prior: Prior) -> Hyp
     growth = growth / (1 - growth)
     words = _settled(gray, printed, *some, growth, family, prior.expected)
     good = _mean_odds(words, edges.weight) > hopeful
+    if not good.any():
+        return unread
     read, growth = read[good], growth[good]
     printed, words = printed.select(good), words.select(good)
     fit = _joint_fit(gray, printed, words, PER_SECTOR // 2, 1, family)
@@ -94,6 +98,8 @@ def _read_part(gray: np.ndarray, dots: Fit, family: Family, prior: Prior) -> Hyp
     words = with_ends(polar, words, overhang, edges.lit, family)
     words = replace(words, unlike=unlike_print(polar, words, growth, overhang, family))
     good = _mean_odds(words, edges.weight) > hopeful
+    if not good.any():
+        return unread
     read, dots, words = read[good], fit.select(good), words.select(good)
     fit = _joint_fit(gray, dots, words, PER_SECTOR, 2, family)
     fit = _by_dot(fit, dots, growth[good], _thin(dots, growth[good], family))
