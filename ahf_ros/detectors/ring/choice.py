@@ -20,6 +20,7 @@ from ahf_ros.detectors.ring.reading import read_bands
 from ahf_ros.features.circle_fit import ENOUGH, Fit
 
 _CLEAREST = 32  # dots that tell the family of an image
+_OTHERS = 1024  # clearest ones of the others: texture and letters have thousands
 _CLEAR = 0.5  # bound of the mean evidence of a reading, which spots of light hardly reach
 _SEVERAL = 3  # words that show a family where no dot is so clear
 _ROUGH = (0.0,)  # shifts of edges that are tried to find these, px
@@ -35,8 +36,8 @@ def choose_families(gray: np.ndarray, dots: Fit, families: Sequence[Family]) -> 
 
     Where these show none, the likeliest ones of the others are looked at.
     """
-    order = np.argsort(-dots.share * (1 - dots.contrast), kind='stable')
-    clearest, others = dots.select(order[:_CLEAREST]), dots.select(order[_CLEAREST:])
+    dots = _clearest(dots, _CLEAREST + _OTHERS)
+    clearest, others = dots.select(slice(_CLEAREST)), dots.select(slice(_CLEAREST, None))
     words = _words_shown(gray, clearest, families)
     if not words and len(others.frames):
         words = _words_shown(gray, others, families, _SAMPLE)
@@ -45,13 +46,19 @@ def choose_families(gray: np.ndarray, dots: Fit, families: Sequence[Family]) -> 
 
 def further_families(gray: np.ndarray, dots: Fit, families: Sequence[Family]) -> list[Family]:
     """Return the same for dots that no family explains, most of which are none of targets."""
-    dots = dots.select(dots.share >= ENOUGH)
+    dots = _clearest(dots.select(dots.share >= ENOUGH), _OTHERS)
     if not families or not len(dots.frames):
         return []
     finest = {code.band: code.bits for code in sorted(families, key=lambda code: code.bits)}
     mean = bounds(gray, dots, list(finest.items()), _ROUGH).max(axis=0)
     order = np.argsort(-mean, kind='stable')[: np.count_nonzero(mean > _CLEAR)][:_CLEAREST]
     return present_families(_words_shown(gray, dots.select(order), families))[0]
+
+
+def _clearest(dots: Fit, most: int) -> Fit:
+    """Return the clearest dots, so many at the most: those with whole outlines and dark ink."""
+    order = np.argsort(-dots.share * (1 - dots.contrast), kind='stable')
+    return dots.select(order[:most])
 
 
 def _words_shown(
