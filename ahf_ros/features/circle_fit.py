@@ -43,7 +43,6 @@ _OUTLIER = 3.0  # times the usual distance from the circle that quarters the wei
 _MINIMUM_SPREAD = 0.5  # that counts as usual, in deviations that noise alone would cause
 _ROUNDS = 4  # of robust least squares
 _PLACED, _PLACED_RADII = 4 / 3, 0.08  # error of an edge in its place: in outliers, and dot radii
-_PLACED_PIXELS = 0.65  # the same of small dots, px, as noise and blur do not shrink with them
 _MINIMUM_GAIN = 0.2  # where many errors lie beyond the turning point of the weight function
 _MAXIMUM_CHANGE = 0.3  # of a frame in one measurement, dot radii
 _LIGHT_REACH = 0.3  # standard deviation of the window in which the light is even, dot radii
@@ -170,8 +169,7 @@ def fit_circles(
         np.clip(of_frame, -_MAXIMUM_CHANGE, _MAXIMUM_CHANGE, out=of_frame)
         moved = frame.moved(frames, of_frame)
     seen, errors = solution.own.seen, solution.errors
-    near = np.abs(errors) < np.maximum(_PLACED_RADII, _PLACED_PIXELS / edges.scale)
-    placed = seen & (solution.relative < _PLACED) & near
+    placed = seen & (solution.relative < _PLACED) & (np.abs(errors) < _PLACED_RADII)
     count = placed.sum(axis=1)
     squares = np.where(placed, errors * edges.scale, 0) ** 2
     covariance = np.full((len(frames), 2, 2), np.nan)

@@ -35,7 +35,7 @@ def test_certain_targets_are_explained_with_their_bands_and_whole_dots_without()
     dot = Explained.by(read(False))
     assert (target.certain.tolist(), dot.certain.tolist()) == ([True], [False])
     assert np.allclose(target.sizes, 10 * (CODE.band_outer + 0.45))
-    assert np.allclose(dot.sizes, 14.5)
+    assert np.allclose(dot.sizes, 12.5)
     assert len(Explained.by(read(False, share=0.5)).frames) == 0
     both = Explained.joined([target, dot])
     assert [len(both.outlines_in(level)) for level in (0, 3, 4, 6)] == [2, 2, 1, 0]
