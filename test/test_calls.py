@@ -14,6 +14,7 @@ RECORDED = json.loads(RECORD.read_text())
 SQUARE = {name for name in IMAGES if name.startswith(('aruco', 'apriltag', 'auto'))}
 
 
+@pytest.mark.lasting  # with the newest versions only: the oldest ones read light otherwise
 @pytest.mark.parametrize(
     'name',
     [pytest.param(it, marks=needs_square_markers) if it in SQUARE else it for it in IMAGES],
