@@ -17,6 +17,7 @@ from ahf_ros.detectors.ring.families import contested, decoded, present_families
 from ahf_ros.detectors.ring.hypotheses import Hypotheses
 from ahf_ros.detectors.ring.proposals import HOPEFUL, bounds, measure_likely
 from ahf_ros.detectors.ring.reading import read_bands
+from ahf_ros.detectors.ring.rivals import has_all
 from ahf_ros.features.circle_fit import ENOUGH, Fit
 
 _CLEAREST = 32  # dots that tell the family of an image
@@ -97,7 +98,11 @@ def _read(gray: np.ndarray, dots: Fit, families: Sequence[Family]) -> list[tuple
     the others find nothing, as they have no other words.
     """
     dots, _ = measure_likely(gray, dots, None)
-    narrow = [code for code in families if _has_wider(code, families)]
+    narrow = [
+        code
+        for code in families
+        if any(has_all(of, code) and len(code.words) < len(of.words) for of in families)
+    ]
     found = [read_bands(gray, dots, code) for code in families if code not in narrow]
     conceivable = np.any([of.confidence >= _CONCEIVABLE for of in found], axis=0)
     if conceivable.any():
@@ -105,13 +110,3 @@ def _read(gray: np.ndarray, dots: Fit, families: Sequence[Family]) -> list[tuple
     read = contested(Hypotheses.joined(found))
     read = read.select(read.certain & (read.coded > -DOUBT))
     return list(zip(read.families.tolist(), decoded(read)[1].tolist(), strict=True))
-
-
-def _has_wider(code: Family, families: Sequence[Family]) -> bool:
-    """Return whether another of some families has all words of one, in the same print."""
-    return any(
-        (code.band, code.bits) == (other.band, other.bits)
-        and len(code.words) < len(other.words)
-        and bool(np.isin(code.words, other.words).all())
-        for other in families
-    )

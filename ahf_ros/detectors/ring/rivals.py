@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import cache
+from functools import lru_cache
 
 import numpy as np
 
@@ -104,7 +104,7 @@ def word_ceilings(
     return np.array(ceilings)
 
 
-@cache
+@lru_cache(maxsize=256)  # bands that are measured make families of their own in every image
 def has_all(code: Family, other: Family) -> bool:
     """Return whether a family has all words of another one, in the same print."""
     same = (code.band, code.bits) == (other.band, other.bits)
