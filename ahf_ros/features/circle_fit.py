@@ -75,6 +75,16 @@ class Fit(ArrayRecord):
         """Radii of circles with the areas of the dots, px, shape (k,)."""
         return frame.mean_radii(self.frames)
 
+    @property
+    def clearness(self) -> np.ndarray:
+        """How whole outlines are, and how dark ink is, from 0 to 1, shape (k,)."""
+        clearness: np.ndarray = self.share * (1 - self.contrast)
+        return clearness
+
+    def clearest(self, most: int | None = None) -> Fit:
+        """Return the clearest targets first, so many at the most."""
+        return self.select(np.argsort(-self.clearness, kind='stable')[:most])
+
 
 _NO_FRAMES, _NO_COVARIANCES = np.zeros((0, 3, 3)), np.zeros((0, 2, 2))
 NO_FITS = Fit(

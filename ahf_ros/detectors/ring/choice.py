@@ -37,7 +37,7 @@ def choose_families(gray: np.ndarray, dots: Fit, families: Sequence[Family]) -> 
 
     Where these show none, the likeliest ones of the others are looked at.
     """
-    dots = _clearest(dots, _CLEAREST + _OTHERS)
+    dots = dots.clearest(_CLEAREST + _OTHERS)
     clearest, others = dots.select(slice(_CLEAREST)), dots.select(slice(_CLEAREST, None))
     words = _words_shown(gray, clearest, families)
     if not words and len(others.frames):
@@ -47,19 +47,13 @@ def choose_families(gray: np.ndarray, dots: Fit, families: Sequence[Family]) -> 
 
 def further_families(gray: np.ndarray, dots: Fit, families: Sequence[Family]) -> list[Family]:
     """Return the same for dots that no family explains, most of which are none of targets."""
-    dots = _clearest(dots.select(dots.share >= ENOUGH), _OTHERS)
+    dots = dots.select(dots.share >= ENOUGH).clearest(_OTHERS)
     if not families or not len(dots.frames):
         return []
     finest = {code.band: code.bits for code in sorted(families, key=lambda code: code.bits)}
     mean = bounds(gray, dots, list(finest.items()), _ROUGH).max(axis=0)
     order = np.argsort(-mean, kind='stable')[: np.count_nonzero(mean > _CLEAR)][:_CLEAREST]
     return present_families(_words_shown(gray, dots.select(order), families))[0]
-
-
-def _clearest(dots: Fit, most: int) -> Fit:
-    """Return the clearest dots, so many at the most: those with whole outlines and dark ink."""
-    order = np.argsort(-dots.share * (1 - dots.contrast), kind='stable')
-    return dots.select(order[:most])
 
 
 def _words_shown(

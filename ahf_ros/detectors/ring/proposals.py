@@ -99,18 +99,19 @@ def measure_likely(
 ) -> tuple[Fit, Fit]:
     """Return better fits of the dots whose bands are worth reading, and those of the others.
 
-    The most hopeful dots come first. Without families, all dots are worth it.
+    The most hopeful dots come first, by their bands and by how clear they are themselves: gaps
+    between spots of light have as much of a band as small targets, but are neither round nor dark.
+    Without families, all dots are worth it.
     """
-    others = NO_FITS
+    others, hope = NO_FITS, np.ones(len(dots.frames))
     if families is not None:
         hope = hopes(gray, dots, families)
-        order = np.argsort(-hope, kind='stable')
-        number = np.count_nonzero(hope > HOPEFUL)
-        others = dots.select(order[number:])
-        dots = dots.select(order[:number])
+        others = dots.select(hope <= HOPEFUL)
+        dots, hope = dots.select(hope > HOPEFUL), hope[hope > HOPEFUL]
     parts = (dots.select(slice(start, start + PART)) for start in range(0, len(dots.frames), PART))
     fit = Fit.joined([NO_FITS, *(_fit(gray, part) for part in parts)])
-    return fit.select(fit.share >= ENOUGH), others
+    order = np.argsort(-hope * fit.clearness**2, kind='stable')
+    return fit.select(order[fit.share[order] >= ENOUGH]), others
 
 
 def _fit(gray: np.ndarray, dots: Dots | Fit, *, covariances: bool = True) -> Fit:
