@@ -35,13 +35,9 @@ _PRINTS = 3  # the most likely ones, which are tried on the same dots
 def choose_families(gray: np.ndarray, dots: Fit, families: Sequence[Family]) -> list[Family]:
     """Return as few of some families as have all words of the print that the clearest dots show.
 
-    Where these show none, the likeliest ones of the others are looked at.
+    Only their likeliest print is tried, on the likeliest of them.
     """
-    dots = dots.clearest(_CLEAREST + _OTHERS)
-    clearest, others = dots.select(slice(_CLEAREST)), dots.select(slice(_CLEAREST, None))
-    words = _words_shown(gray, clearest, families)
-    if not words and len(others.frames):
-        words = _words_shown(gray, others, families, _SAMPLE)
+    words = _words_shown(gray, dots.clearest(_CLEAREST), families, tried=1, most=_SAMPLE)
     return present_families(words)[0]
 
 
@@ -57,22 +53,36 @@ def further_families(gray: np.ndarray, dots: Fit, families: Sequence[Family]) ->
 
 
 def _words_shown(
-    gray: np.ndarray, dots: Fit, families: Sequence[Family], most: int = _LIKELIEST
+    gray: np.ndarray,
+    dots: Fit,
+    families: Sequence[Family],
+    tried: int = _PRINTS,
+    most: int = _LIKELIEST,
 ) -> list[dict[Family, int]]:
     """Return words of the likeliest print of some dots that has any, by family.
 
-    Of each print so many of the likeliest dots are read at the most, of the likeliest print a
-    sample first, as it is nearly always the right one.
+    So many prints are tried at the most, on so many of the likeliest dots, of the likeliest print
+    on a sample first, as it is nearly always the right one.
     """
     prints = list(dict.fromkeys((code.band, code.bits) for code in families))
     mean = bounds(gray, dots, prints)
     hopeful = (mean.max(axis=0) > HOPEFUL) & (dots.share >= ENOUGH)
+    if not hopeful.any():
+        return []
     dots, mean = dots.select(hopeful), mean[:, hopeful]
-    likely = mean > mean.max(axis=0, initial=-np.inf) - _NEARLY
-    by_print = np.argsort(-np.maximum(mean, 0).sum(axis=1), kind='stable')[:_PRINTS].tolist()
+    likely = mean > mean.max(axis=0) - _NEARLY
+    of_prints = np.maximum(mean, 0).mean(axis=1)
+    # Whatever has a number of sectors has its multiples as well.
+    for index, (band, bits) in enumerate(prints):
+        if any(
+            of_prints[other] > of_prints[index] - _NEARLY
+            for other, (of_band, fewer) in enumerate(prints)
+            if of_band == band and fewer < bits and bits % fewer == 0
+        ):
+            of_prints[index] -= _NEARLY
+    by_print = np.argsort(-of_prints, kind='stable')[:tried].tolist()
     for rank, best in enumerate(by_print):
         band, bits = prints[best]
-        # Whatever has a number of sectors has its multiples as well.
         same = [code for code in families if code.band == band and bits % code.bits == 0]
         words: list[tuple[Family, int]] = []
         order = np.argsort(-mean[best], kind='stable')

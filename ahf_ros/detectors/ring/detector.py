@@ -168,11 +168,16 @@ def read_pyramid(
     settings: DetectorSettings,
     expected: frozenset[int],
     proposals: Sequence[Proposal],
+    shown: Sequence[Family] = (),
 ) -> Hypotheses:
-    """Find the dots and words in an image pyramid; see `read_image`."""
+    """Find the dots and words in an image pyramid; see `read_image`.
+
+    Without families that are known to be shown, a glance at the clearest dots tells them, or a
+    closer look in the end. Dots that were left unread until then are read with these.
+    """
     described: Sequence[Family] = settings.codes(Family)
     families = described
-    shown = list(families) if len(families) == 1 else []
+    shown = list(families if len(families) == 1 else shown)
     images = (pyramid.gray, *pyramid.halves)
     nothing = Hypotheses.unread(NO_FITS, families[0])
     seen = _Seen((nothing,), Explained.by(nothing))
@@ -187,7 +192,10 @@ def read_pyramid(
             families = with_measured_bands(part, dots, families)
             by_name = {code.name: code for code in families}
             shown = [by_name[code.name] for code in shown]
-            shown = shown or choose_families(part, dots, families)
+            if not shown:
+                shown = choose_families(part, dots, families)
+                if shown and any(len(read.words) for read in seen.found):
+                    return read_pyramid(pyramid, settings, expected, proposals, shown)
             codes = shown or families[:1]
             likely, others = NO_FITS, dots
             if shown or every:
@@ -199,13 +207,15 @@ def read_pyramid(
         measured.append((octave, Fit.joined(fits)))
     for octave, dots in measured:
         part = octave.pyramid.gray
-        while shown:
+        while True:
             targets = seen.explained.select(seen.explained.certain)
             rest = dots.select(~targets.on_them(dots.frames, octave.level))
             left = [code for code in families if code not in shown]
             codes = further_families(part, rest, left)
             if not codes:
                 break
+            if not shown:
+                return read_pyramid(pyramid, settings, expected, proposals, codes)
             clear = seen.explained.select(seen.explained.clear)
             dots = dots.select(~clear.on_them(dots.frames, octave.level))
             likely, _ = measure_likely(part, dots, codes)
