@@ -23,7 +23,7 @@ from ahf_ros.features.circle_fit import ENOUGH, Fit
 _CLEAREST = 32  # dots that tell the family of an image
 _OTHERS = 1024  # clearest ones of the others: texture and letters have thousands
 _CLEAR = 0.5  # bound of the mean evidence of a reading, which spots of light hardly reach
-_SEVERAL = 3  # words that show a family where no dot is so clear
+_DOUBTED = 0.01  # probability that all words are wrong, below which they show a family
 _ROUGH = (0.0,)  # shifts of edges that are tried to find these, px
 _SAMPLE = 8  # of those that seem to have a print, which are read first
 _LIKELIEST = 16  # dots to have a print, of which none shows that it is not there
@@ -84,18 +84,22 @@ def _words_shown(
     for rank, best in enumerate(by_print):
         band, bits = prints[best]
         same = [code for code in families if code.band == band and bits % code.bits == 0]
-        words: list[tuple[Family, int]] = []
+        read: list[Hypotheses] = []
         order = np.argsort(-mean[best], kind='stable')
         likeliest = order[likely[best, order]][:most]
         ends = [0, _SAMPLE, most] if rank == 0 else [0, most]
         for some in filter(len, (likeliest[part] for part in map(slice, ends, ends[1:]))):
-            words += _read(gray, dots.select(some), same)
-            if len(words) >= _SEVERAL or (words and mean[best, some].max() > _CLEAR):
-                return [words_of_print(code, word, tuple(families)) for code, word in words]
+            read.append(_read(gray, dots.select(some), same))
+            every = Hypotheses.joined(read)
+            if np.prod(1 - every.confidence) < _DOUBTED:
+                return [
+                    words_of_print(code, word, tuple(families))
+                    for code, word in zip(every.families, decoded(every)[1].tolist(), strict=True)
+                ]
     return []
 
 
-def _read(gray: np.ndarray, dots: Fit, families: Sequence[Family]) -> list[tuple[Family, int]]:
+def _read(gray: np.ndarray, dots: Fit, families: Sequence[Family]) -> Hypotheses:
     """Return the words of dots, by those of some families that explain their bands best.
 
     Families that have all words of others are read first. Where they find nothing conceivable,
@@ -112,5 +116,4 @@ def _read(gray: np.ndarray, dots: Fit, families: Sequence[Family]) -> list[tuple
     if conceivable.any():
         found += [read_bands(gray, dots.select(conceivable), code) for code in narrow]
     read = contested(Hypotheses.joined(found))
-    read = read.select(read.certain & (read.coded > -DOUBT))
-    return list(zip(read.families.tolist(), decoded(read)[1].tolist(), strict=True))
+    return read.select(read.certain & (read.coded > -DOUBT))
