@@ -27,9 +27,7 @@ class Circles:
     @property
     def spacing(self) -> np.ndarray:
         """Distances from each point to the next on its circle, dot radii."""
-        last = np.flatnonzero(np.diff(self.radii, append=np.inf))
-        count = np.diff(last, prepend=-1)
-        return 2 * np.pi * self.radii / np.repeat(count, count)
+        return 2 * np.pi * self.radii / (self.radii[:, None] == self.radii).sum(axis=1)
 
 
 def dot_circles(polarity: np.ndarray, rays: int) -> Circles:

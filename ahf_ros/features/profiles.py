@@ -115,21 +115,18 @@ def _fit_steps(values: np.ndarray, groups: np.ndarray) -> np.ndarray:
     `groups`, shape (n,), ascend, see `_step_filters`. The result, shape (7, n), has the fields of
     `Edges` up to the residual.
     """
-    best = np.empty(len(values), np.intp)
-    bounds = np.flatnonzero(np.diff(groups, prepend=-1, append=-1))
-    for start, end in pairwise(bounds):
-        best[start:end] = _best_offsets(values[start:end], _step_filters(int(groups[start])))
-    kinds = groups * _OFFSETS + best
+    found = np.empty((len(values), 3 * _OFFSETS), np.float32)
+    for some, group in _runs(groups):
+        np.matmul(values[some], _step_filters(group).search, out=found[some])
+    kinds = groups * _OFFSETS + _best_offsets(found)
     order = np.argsort(kinds, kind='stable')
     ordered, kinds = values[order], kinds[order]
     parameters = np.empty((len(values), 5 + _SAMPLES), np.float32)
     known = np.empty((3, len(values)))
-    bounds = np.flatnonzero(np.diff(kinds, prepend=-1, append=-1))
-    for start, end in pairwise(bounds):
-        group, index = divmod(int(kinds[start]), _OFFSETS)
-        filters = _step_filters(group)
-        np.matmul(ordered[start:end], filters.parts[index], out=parameters[start:end])
-        known[:, start:end] = filters.known[:, index, None]
+    for some, kind in _runs(kinds):
+        filters, index = _step_filters(kind // _OFFSETS), kind % _OFFSETS
+        np.matmul(ordered[some], filters.parts[index], out=parameters[some])
+        known[:, some] = filters.known[:, index, None]
     low, high, moved, light, blurred = parameters[:, :5].T.astype(np.float64)
     rest = parameters[:, 5:]
     residual = np.sqrt(np.einsum('ij,ij->i', rest, rest) / values.shape[1])
@@ -149,12 +146,19 @@ class _StepFilters:
     known: np.ndarray  # (3, p), offsets, their spacing, how a slope of the light moves steps, px^2
 
 
-def _best_offsets(values: np.ndarray, filters: _StepFilters) -> np.ndarray:
-    """Return the indices of the offsets at which steps explain profiles best."""
-    found = values @ filters.search
-    first, second, contrast = (
-        found[:, index * _OFFSETS : (index + 1) * _OFFSETS] for index in range(3)
-    )
+def _runs(values: np.ndarray) -> list[tuple[slice, int]]:
+    """Return the runs of equal integers among ascending ones, shape (n,), and these integers."""
+    starts = np.flatnonzero(values[1:] != values[:-1]) + 1
+    bounds = [0, *starts.tolist(), len(values)] if len(values) else []
+    return [(slice(start, end), int(values[start])) for start, end in pairwise(bounds)]
+
+
+def _best_offsets(found: np.ndarray) -> np.ndarray:
+    """Return the indices of the offsets at which steps explain n profiles best.
+
+    What the filters of the search found has the shape (n, 3 p).
+    """
+    first, second, contrast = found.reshape(len(found), 3, _OFFSETS).swapaxes(0, 1)
     first *= first
     second *= second
     first += second
