@@ -112,6 +112,20 @@ class Rings(ArrayRecord):
         return self.of_target * word_probability(self.word_features)
 
 
+NO_RINGS = Rings(
+    frames=np.zeros((0, 3, 3)),
+    covariance=np.zeros((0, 2, 2)),
+    polarity=np.zeros(0, int),
+    words=np.zeros(0, int),
+    phase=np.zeros(0),
+    edge_shift=np.zeros(0),
+    radius=np.zeros(0),
+    target_features=np.zeros((0, 3)),
+    word_features=np.zeros((0, 4)),
+)
+"""An empty record."""
+
+
 def target_features(readings: Readings, fit: Fit) -> np.ndarray:
     """Return what separates targets from other things, shape (k, 3).
 
@@ -154,13 +168,11 @@ def word_probability(features: np.ndarray) -> np.ndarray:
 
 def read_discs(pyramid: ImagePyramid, discs: Dots, code: DotFamily) -> Rings:
     """Return the rings of dots about discs, as far as they lie in the image."""
-    count = max(len(discs.frames), 1)
-    return Rings.joined(
-        [
-            _read_part(pyramid, discs.select(np.s_[start : start + _PART]), code)
-            for start in range(0, count, _PART)
-        ]
-    )
+    parts = [
+        _read_part(pyramid, discs.select(np.s_[start : start + _PART]), code)
+        for start in range(0, len(discs.frames), _PART)
+    ]
+    return Rings.joined([NO_RINGS, *parts])
 
 
 def _read_part(pyramid: ImagePyramid, discs: Dots, code: DotFamily) -> Rings:
