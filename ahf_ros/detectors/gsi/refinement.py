@@ -20,7 +20,7 @@ from ahf_ros.features.sampling import sample_circles
 from ahf_ros.imaging.black import black_lift
 
 _RAYS = 32  # about a dot
-_REACHES = ((2.3, 0.45), (1.1, 0.95), (0.5, 1.9))
+_SIZES, _REACHES = np.array([0.5, 1.1, 2.3]), np.array([1.9, 0.95, 0.45])
 # Semi-minor axis of a dot, px, from where on its edge is looked for within a reach, dot radii.
 _MAXIMUM_MOVE, _MAXIMUM_MOVE_SHARE = 0.8, 0.25  # that the centre of a dot is moved: px, radii
 _UNMEASURED = 0.3  # standard deviation of a centre whose edge was not fitted, px
@@ -89,18 +89,16 @@ def measure_dots(gray: np.ndarray, frames: np.ndarray, polarity: np.ndarray) -> 
     fitted = frames.copy()
     covariance = np.tile(_UNMEASURED**2 * np.eye(2), (len(frames), 1, 1))
     found, near = np.zeros((2, len(frames)), bool)
-    above = np.inf
-    for smallest, reach in _REACHES:
-        which = np.flatnonzero((minor >= smallest) & (minor < above))
-        above = smallest
-        circles = dot_circles(polarity[which], _RAYS)
-        fit = fit_circles_of_any_blur(gray, frames[which], circles, reach=reach, projective=False)
-        moved = np.hypot(*(fit.frames[:, :2, 2] - frames[which, :2, 2]).T)
-        good = fit.share >= ENOUGH
-        found[which], fitted[which[good]] = good, fit.frames[good]
-        good &= moved <= np.maximum(_MAXIMUM_MOVE, _MAXIMUM_MOVE_SHARE * minor[which])
-        near[which] = good
-        covariance[which[good]] = fit.covariance[good] + _MINIMUM_ERROR**2 * np.eye(2)
+    which = np.flatnonzero(minor >= _SIZES[0])
+    reach = _REACHES[np.searchsorted(_SIZES, minor[which], 'right') - 1, None]
+    circles = dot_circles(polarity[which], _RAYS)
+    fit = fit_circles_of_any_blur(gray, frames[which], circles, reach=reach, projective=False)
+    moved = np.hypot(*(fit.frames[:, :2, 2] - frames[which, :2, 2]).T)
+    good = fit.share >= ENOUGH
+    found[which], fitted[which[good]] = good, fit.frames[good]
+    good &= moved <= np.maximum(_MAXIMUM_MOVE, _MAXIMUM_MOVE_SHARE * minor[which])
+    near[which] = good
+    covariance[which[good]] = fit.covariance[good] + _MINIMUM_ERROR**2 * np.eye(2)
     return MeasuredDots(frames=fitted, covariance=covariance, found=found, near=near)
 
 
