@@ -159,10 +159,13 @@ def read_targets(
     """
     polarities = [np.flatnonzero(dots.polarity == polarity) for polarity in (1, -1)]
     for which in sorted(polarities, key=len):
-        certain = known.polarity[resolve(known, code)]
-        if len(which) > FEW and len(certain) and not np.isin(certain, dots.polarity[which]).any():
-            continue
+        if len(which) > FEW:
+            certain = known.polarity[resolve(known, code)]
+            if len(certain) and not np.isin(certain, dots.polarity[which]).any():
+                continue
         templates = find_templates(dots.select(which), code, obvious=obvious)
+        if not len(templates.polarity):
+            continue
         known = Hypotheses.joined([known, _read(pyramid, templates, code, obvious=obvious)])
     return known
 
@@ -259,8 +262,10 @@ def _printed(
     The radii are those of the image where their scale, shape (k,), is given.
     """
     count = len(code.template)
-    rows = [[*range(count), *(count + code.decoding_dots(word))] for word in words.tolist()]
-    which = np.array(rows, int).reshape(len(words), count + code.rule.dots)
+    decoding = np.nonzero(words[:, None] >> code.position_numbers & 1)[1]
+    which = np.empty((len(words), count + code.rule.dots), int)
+    which[:, :count] = np.arange(count)
+    which[:, count:] = count + decoding.reshape(len(words), code.rule.dots)
     radii = code.radii[which]
     return code.places[which], radii if scale is None else radii * scale[:, None]
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cache, partial
+from functools import cache, lru_cache, partial
 from itertools import pairwise
 
 import cv2
@@ -96,6 +96,7 @@ class Pairs:
         return self.error[0] * lengths + self.error[1]
 
 
+@lru_cache(maxsize=8)
 def radius_scales(family: PointFamily) -> tuple[float, float]:
     """Return the bounds of the radii that dots may have, in those of the printed design."""
     places = family.places[: len(family.template)]
@@ -236,13 +237,12 @@ def find_templates(dots: Dots, family: PointFamily, *, obvious: bool = False) ->
     error = _LENGTH_ERROR if few else _LENGTH_ERROR_OF_MANY
     pairs = neighbours(dots, family, triples, error, obvious=obvious)
     nearest = cache(partial(nearest_dots, centres, smallest / 3))
-    templates = [nothing]
-    for triple in triples:
-        members = _members(dots, pairs, nearest, family, triple)
-        if len(members):
-            fitted = _fitted(dots, members, family)
-            templates.append(fitted.select(_mostly_empty(fitted, nearest(), family)))
-    return _distinct(Templates.joined(templates))
+    members = [_members(dots, pairs, nearest, family, triple) for triple in triples]
+    groups = np.unique(np.concatenate(members), axis=0)
+    if not len(groups):
+        return nothing
+    templates = _fitted(dots, groups, family)
+    return _best(templates.select(_mostly_empty(templates, nearest(), family)))
 
 
 def _triples(places: np.ndarray, reference: int, thorough: bool) -> list[tuple[int, int, int]]:
@@ -312,7 +312,7 @@ def _members(
         members[(members < 0).sum(axis=1) > 1] = -1
         kept = np.argsort(error, kind='stable')[:_MAXIMUM_GROUPS]
         found.append(members[kept[members[kept, role] >= 0]])
-    return np.unique(np.concatenate(found), axis=0)
+    return np.concatenate(found)
 
 
 def _thirds(
@@ -418,11 +418,9 @@ def _mostly_empty(templates: Templates, nearest: Nearest, family: PointFamily) -
     return empty
 
 
-def _distinct(templates: Templates) -> Templates:
-    """Return the templates best first, of those with the same dots one."""
-    order = np.argsort(templates.misfit, kind='stable')
-    _, first = np.unique(templates.members[order], axis=0, return_index=True)
-    best = templates.select(order[np.sort(first)])
+def _best(templates: Templates) -> Templates:
+    """Return the templates best first, without parts of others."""
+    best = templates.select(np.argsort(templates.misfit, kind='stable'))
     return best.select(np.flatnonzero(~_parts_of_others(best))[:_MAXIMUM_TEMPLATES])
 
 

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from ahf_ros.codes.gsi import PointFamily
-from ahf_ros.detectors.claims import owners
+from ahf_ros.detectors.claims import Rivals, owners
 from ahf_ros.detectors.gsi.evidence import Readings
 from ahf_ros.detectors.gsi.grouping import Templates
 from ahf_ros.detectors.gsi.refinement import Placement
@@ -135,11 +135,11 @@ def plausible(
     units = reference_frames(templates.homographies[order], float(equal))
     around = reference_frames(templates.homographies[order], family.reach * _APART)
     words, support, centres = readings.words[order], readings.support[order], units[:, :2, 2]
+    alike, near = _within_each(centres, units), _within_each(centres, around)
 
     def rivals(index: int) -> np.ndarray:
         worse = support < support[index] - (0.0 if obvious else _CLEARLY)
-        equal = inside(centres, units[[index]]) & (words == words[index])
-        return equal | inside(centres, around[[index]]) & worse
+        return alike(index) & (words == words[index]) | near(index) & worse
 
     return order[owners(len(order), rivals)][:_MAXIMUM]
 
@@ -153,8 +153,8 @@ def resolve(hypotheses: Hypotheses, family: PointFamily, minimum: float = CERTAI
     order = np.argsort(-confidence, kind='stable')
     order = order[confidence[order] >= minimum]
     units = reference_frames(hypotheses.homographies[order], family.reach * _SAME)
-    words, at = hypotheses.words[order], units[:, :2, 2]
-    return order[owners(len(order), lambda it: inside(at, units[[it]]) | (words == words[it]))]
+    words, near = hypotheses.words[order], _within_each(units[:, :2, 2], units)
+    return order[owners(len(order), lambda it: near(it) | (words == words[it]))]
 
 
 def inside(points: np.ndarray, frames: np.ndarray) -> np.ndarray:
@@ -162,3 +162,15 @@ def inside(points: np.ndarray, frames: np.ndarray) -> np.ndarray:
     offset = points - frames[:, None, :2, 2]
     relative = offset @ np.linalg.inv(frames[:, :2, :2]).swapaxes(1, 2)
     return np.asarray(((relative**2).sum(axis=2) < 1).any(axis=0))
+
+
+def _within_each(points: np.ndarray, frames: np.ndarray) -> Rivals:
+    """Return which points, shape (n, 2), lie in each of some circles, by affine frames."""
+    centres, inverse = frames[:, :2, 2], np.linalg.inv(frames[:, :2, :2]).swapaxes(1, 2)
+
+    def within(index: int) -> np.ndarray:
+        relative = (points - centres[index]) @ inverse[index]
+        some: np.ndarray = (relative**2).sum(axis=1) < 1
+        return some
+
+    return within
