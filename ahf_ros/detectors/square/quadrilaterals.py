@@ -8,6 +8,7 @@ Where a cover or another dark thing changes the outline, its four longest sides 
 
 from __future__ import annotations
 
+from itertools import chain
 from typing import NamedTuple
 
 import cv2
@@ -42,12 +43,12 @@ _SCALES = tuple(
 """Tables of values by gray value, and distances of the outermost dark pixels from the edge, px."""
 
 
-class _Region(NamedTuple):
-    polygon: np.ndarray  # (m, 2), px, clockwise in the image
-    outline: np.ndarray  # (n, 2), its outermost pixels
-    length: float  # of its outline, or of that of its hull, px
-    area: float  # with its holes, px^2
-    growth: float  # distance of its outermost pixels from the edge, px
+class _Regions(NamedTuple):
+    polygons: list[np.ndarray]  # (m, 1, 2) each, px, clockwise in the image
+    outlines: list[np.ndarray]  # (n, 1, 2) each, their outermost pixels
+    lengths: np.ndarray  # (k,), of the outlines, or of those of their hulls, px
+    areas: np.ndarray  # (k,), with their holes, px^2
+    growths: np.ndarray  # (k,), distances of the outermost pixels from the edge, px
 
 
 def find_quadrilaterals(gray: np.ndarray) -> np.ndarray:
@@ -68,47 +69,78 @@ def find_quadrilaterals(gray: np.ndarray) -> np.ndarray:
     # Squares that touch at their corners, such as those of an AprilGrid, hang together by a few
     # pixels. Without their outermost pixels they do not.
     traced.append((cv2.erode(dark, np.ones((3, 3), np.uint8)), growth + 1))
-    regions = [
-        region
-        for dark, growth in traced
-        for outline in _outlines(dark)
-        if (region := _region(outline, growth))
-    ]
+    outlines = [_outlines(dark) for dark, _ in traced]
+    growths = np.repeat([growth for _, growth in traced], [*map(len, outlines)])
+    regions = _regions([*chain(*outlines)], growths)
     sides, four = _four_sides(regions)
-    bordered = _bordered(values, sides, np.array([regions[index].area for index in four]))
-    lines = _fitted([regions[index] for index in four[bordered]], sides[bordered])
+    bordered = _bordered(values, sides, regions.areas[four])
+    lines = _fitted(regions, four[bordered], sides[bordered])
     before = np.roll(lines, 1, axis=1)
     corners = meet(before[:, :, 0], before[:, :, 1], lines[:, :, 0], lines[:, :, 1])
-    convex = [cv2.isContourConvex(of) for of in corners.astype(np.float32)]
-    return corners[np.array(convex, bool)]
+    apart = corners.astype(np.float32)  # in which corners that are nearly one are one
+    along = np.roll(apart, -1, axis=1) - apart
+    turns = np.sign(_cross(along, np.roll(along, -1, axis=1)))
+    convex: np.ndarray = corners[np.abs(turns.sum(axis=1)) == 4]
+    return convex
 
 
 def _outlines(dark: np.ndarray) -> list[np.ndarray]:
-    """Return the outlines of regions that are large enough, without those of holes, (n, 1, 2)."""
+    """Return the outlines of regions and of holes that are large enough, (n, 1, 2) each."""
     outlines, _ = cv2.findContours(dark, cv2.RETR_LIST, cv2.CHAIN_APPROX_NONE)
-    large = [of for of in outlines if len(of) >= _SHORTEST * _SMALLEST]
-    return [of for of in large if cv2.contourArea(of, oriented=True) <= 0]
+    return [of for of in outlines if of.shape[0] >= _SHORTEST * _SMALLEST]
 
 
-def _region(outline: np.ndarray, growth: float) -> _Region | None:
-    """Return the region in an outline if it may have four straight sides."""
-    area = cv2.contourArea(outline)
-    length = cv2.arcLength(outline, closed=True)
-    around = outline
-    if area < _SOLID * length**2 / 16:
-        _, _, width, height = cv2.boundingRect(outline)
-        if length > _TATTERED * (width + height) or area < _FILLED * width * height:
-            return None
-        around = cv2.convexHull(outline)
-        area, length = cv2.contourArea(around), cv2.arcLength(around, closed=True)
-    if area < max(_SOLID * length**2 / 16, _SMALLEST**2 / 2):
-        return None
-    polygon = cv2.approxPolyDP(around, max(_TOLERANCE * length, 1.0), closed=True)[::-1, 0]
-    if not 4 <= len(polygon) <= _MAXIMUM_CORNERS:
-        return None
-    if cv2.contourArea(polygon, oriented=True) < 0:
-        polygon = polygon[::-1]
-    return _Region(polygon, outline[:, 0], length, area, growth)
+def _regions(outlines: list[np.ndarray], growths: np.ndarray) -> _Regions:
+    """Return the regions in outlines that may have four straight sides."""
+    areas, lengths, boxes = _measured(outlines)
+    areas = -areas  # of holes negative
+    solid = areas >= _SOLID * lengths**2 / 16
+    likely = lengths <= _TATTERED * boxes.sum(axis=1)
+    likely &= areas >= _FILLED * boxes.prod(axis=1)
+    which = np.flatnonzero((areas >= 0) & (solid | likely))
+    around = [
+        outlines[index] if solid[index] else cv2.convexHull(outlines[index])
+        for index in which.tolist()
+    ]
+    areas, lengths, _ = _measured(around)
+    areas = np.abs(areas)
+    large = areas >= np.maximum(_SOLID * lengths**2 / 16, _SMALLEST**2 / 2)
+    tolerances = np.maximum(_TOLERANCE * lengths, 1.0)
+    polygons = [
+        cv2.approxPolyDP(around[index], tolerances[index], closed=True)
+        for index in np.flatnonzero(large).tolist()
+    ]
+    turned = _measured(polygons)[0] <= 0
+    counts = np.array([*map(len, polygons)])
+    some = np.flatnonzero((counts >= 4) & (counts <= _MAXIMUM_CORNERS))
+    kept = np.flatnonzero(large)[some]
+    which = which[kept]
+    return _Regions(
+        [polygons[index][::-1] if turned[index] else polygons[index] for index in some],
+        [outlines[index] for index in which],
+        lengths[kept],
+        areas[kept],
+        growths[which],
+    )
+
+
+def _measured(outlines: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return areas, positive for those clockwise in the image, lengths, and sides of boxes, px."""
+    points = _points(outlines)
+    counts = np.array([*map(len, outlines)], int)
+    first = np.cumsum(counts) - counts
+    following = np.arange(1, len(points) + 1)
+    following[first + counts - 1] = first
+    after = points[following]
+    lengths = np.add.reduceat(np.hypot(*(after - points).T), first)
+    boxes = np.maximum.reduceat(points, first) - np.minimum.reduceat(points, first) + 1
+    areas = np.add.reduceat(_cross(points, after), first, dtype=np.float64) / 2
+    return areas, lengths, boxes
+
+
+def _points(outlines: list[np.ndarray]) -> np.ndarray:
+    """Return the points of outlines, one after the other, shape (n, 2)."""
+    return np.concatenate([np.zeros((0, 1, 2), np.int32), *outlines])[:, 0]
 
 
 def _bordered(values: np.ndarray, sides: np.ndarray, regions: np.ndarray) -> np.ndarray:
@@ -137,25 +169,24 @@ def _bordered(values: np.ndarray, sides: np.ndarray, regions: np.ndarray) -> np.
     return which[seen]
 
 
-def _four_sides(regions: list[_Region]) -> tuple[np.ndarray, np.ndarray]:
+def _four_sides(regions: _Regions) -> tuple[np.ndarray, np.ndarray]:
     """Return the four longest sides of polygons, (k, 4, 2, 2), and the indices of their regions.
 
     They are in the order of the polygon, and no two are on one line; polygons without four such
     sides have none.
     """
-    counts = np.array([len(region.polygon) for region in regions], int)
+    counts = np.array([*map(len, regions.polygons)], int)
     used = np.arange(_MAXIMUM_CORNERS) < counts[:, None]
     starts = np.zeros((*used.shape, 2))
-    if len(regions):
-        starts[used] = np.concatenate([region.polygon for region in regions])
+    starts[used] = _points(regions.polygons)
     ends = np.roll(starts, -1, axis=1)
-    ends[np.arange(len(regions)), counts - 1] = starts[:, 0]
+    ends[np.arange(len(counts)), counts - 1] = starts[:, 0]
     vectors = np.where(used[..., None], ends - starts, 0)
     lengths = np.hypot(vectors[..., 0], vectors[..., 1])
     longest = np.sort(lengths, axis=1)[:, -4:].sum(axis=1)
     which = np.flatnonzero(longest >= _FOUR * lengths.sum(axis=1))
     starts, ends, vectors, lengths = (of[which] for of in (starts, ends, vectors, lengths))
-    aside = _SAME_LINE[1] * np.array([regions[index].length for index in which])[:, None]
+    aside = _SAME_LINE[1] * regions.lengths[which, None]
     chosen = used[which] & (counts[which] == 4)[:, None]
     order = np.argsort(-lengths, axis=1, kind='stable')
     rows = np.arange(len(which))
@@ -184,27 +215,28 @@ def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
 
 
-def _fitted(regions: list[_Region], sides: np.ndarray) -> np.ndarray:
+def _fitted(regions: _Regions, which: np.ndarray, sides: np.ndarray) -> np.ndarray:
     """Return the ends of lines fitted to the points near four sides of regions, (k, 4, 2, 2).
 
     Regions are left out that have a side with few points.
     """
     fitted = [np.zeros((0, 4, 2, 2))]
-    for start in range(0, len(regions), _TOGETHER):
+    for start in range(0, len(which), _TOGETHER):
         some = slice(start, start + _TOGETHER)
-        fitted.append(_lines(regions[some], sides[some]))
+        fitted.append(_lines(regions, which[some], sides[some]))
     return np.concatenate(fitted)
 
 
-def _lines(regions: list[_Region], sides: np.ndarray) -> np.ndarray:
-    counts = [len(region.outline) for region in regions]
+def _lines(regions: _Regions, which: np.ndarray, sides: np.ndarray) -> np.ndarray:
+    outlines = [regions.outlines[index] for index in which]
+    counts = [*map(len, outlines)]
     first = np.cumsum([0, *counts[:-1]])
-    points = np.concatenate([region.outline for region in regions]).astype(np.float64)
+    points = _points(outlines).astype(np.float64)
     vectors = sides[:, :, 1] - sides[:, :, 0]
     lengths = np.hypot(vectors[..., 0], vectors[..., 1])
     along = vectors / lengths[..., None]
     normals = np.stack([along[..., 1], -along[..., 0]], axis=2)
-    near = np.maximum(_NEAR[0] * np.array([region.length for region in regions]), _NEAR[1])
+    near = np.maximum(_NEAR[0] * regions.lengths[which], _NEAR[1])
 
     def of_points(values: np.ndarray) -> np.ndarray:
         return np.repeat(values, counts, axis=0)
@@ -226,7 +258,7 @@ def _lines(regions: list[_Region], sides: np.ndarray) -> np.ndarray:
     middle, across = total(places) / count, total(offsets) / count
     places -= of_points(middle)
     slope = total(places * offsets) / np.maximum(total(places**2), 1e-9)
-    across += np.array([region.growth for region in regions])[:, None]
+    across += regions.growths[which, None]
     ends = np.stack([across + slope * (end - middle) for end in (-0.5, 0.5)], axis=2)
     lines = sides + ends[..., None] * normals[:, :, None]
     fitted: np.ndarray = lines[count.min(axis=1) >= _FEWEST]
