@@ -144,12 +144,9 @@ class SquareDetector(FamilyDetector):
 def _read(gray: np.ndarray, corners: np.ndarray, groups: Groups) -> tuple[np.ndarray, np.ndarray]:
     """Return the corners of readings, shape (k, 4, 2), and their columns, (k, 5)."""
     found = read(gray, corners, groups)
-    turned = [
-        np.roll(corners[index], turn, axis=0)
-        for index, turn in zip(found.quadrilateral, found.turn, strict=True)
-    ]
+    turned = (np.arange(4) - found.turn[:, None]) % 4
     columns = (found.group, found.number, found.border, found.odds, found.others)
-    return np.array(turned).reshape(-1, 4, 2), np.stack(columns, axis=1)
+    return corners[found.quadrilateral[:, None], turned], np.stack(columns, axis=1)
 
 
 def _laid(
@@ -164,13 +161,17 @@ def _laid(
 
     own = order[owners(len(order), same)]
     own = own[readings[own, 3] <= MINIMUM_ODDS]
-    found = [np.zeros((0, 4, 2))]
+    parts: dict[int, list[tuple[np.ndarray, np.ndarray]]] = {}
     group, number, border = readings[own, :3].T.astype(int)
     for index, width in sorted(set(zip(group.tolist(), border.tolist(), strict=True))):
         alike = (group == index) & (border == width)
         cells = words(groups[index][-1])[number[alike]]
         prints = ~np.pad(cells, ((0, 0), (width, width), (width, width)))
-        fit = lay_prints(gray, Places.unmeasured(corners[own[alike]]), prints)
+        parts.setdefault(prints.shape[1], []).append((corners[own[alike]], prints))
+    found = [np.zeros((0, 4, 2))]
+    for of_size in parts.values():
+        places, prints = map(np.concatenate, zip(*of_size, strict=True))
+        fit = lay_prints(gray, Places.unmeasured(places), prints)
         found.append(fit.corners[fit.share > 0])
     return np.concatenate(found)
 

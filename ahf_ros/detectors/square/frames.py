@@ -69,7 +69,7 @@ def side_lengths(corners: np.ndarray) -> np.ndarray:
 def square_frames(corners: np.ndarray) -> np.ndarray:
     """Return the frames of squares with corners, shape (k, 3, 3)."""
     square = SQUARE.astype(np.float32)
-    found = [cv2.getPerspectiveTransform(square, of.astype(np.float32)) for of in corners]
+    found = [cv2.getPerspectiveTransform(square, of) for of in corners.astype(np.float32)]
     return np.array(found).reshape(-1, 3, 3)
 
 

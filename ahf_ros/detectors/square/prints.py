@@ -79,7 +79,7 @@ def lay_prints(gray: np.ndarray, markers: Places, prints: np.ndarray) -> Places:
     for count in np.unique(counts).tolist():
         alike = np.flatnonzero((counts == count) & (cell <= _LARGEST_CELL))
         places = _places(cells, count)
-        for which in _parts(alike, places):
+        for which in _parts(alike, len(places) ** 2):
             found = _laid(gray, markers.corners[which], prints[which], places, cells)
             own = np.trace(found.covariance, axis1=1, axis2=2)
             better = (found.share >= _ENOUGH) & (own < deviation[which])
@@ -113,16 +113,17 @@ def lay_outlines(gray: np.ndarray, corners: np.ndarray) -> np.ndarray:
     """
     places = _places(_CELLS, _OF_OUTLINE)
     corners = corners.copy()
-    for which in _parts(np.arange(len(corners)), places):
+    # Less than half of the samples are beside an outline.
+    for which in _parts(np.arange(len(corners)), len(places) ** 2 // 2):
         found = _laid(gray, corners[which], np.ones((len(which), 1, 1), bool), places, _CELLS)
         good = found.share >= _ENOUGH
         corners[which[good]] = found.corners[good]
     return corners
 
 
-def _parts(indices: np.ndarray, places: np.ndarray) -> Iterator[np.ndarray]:
-    """Yield the indices of markers, sampled at places along either side, some at a time."""
-    size = max(1, _TOGETHER // len(places) ** 2)
+def _parts(indices: np.ndarray, samples: int) -> Iterator[np.ndarray]:
+    """Yield the indices of markers, with so many samples each, some at a time."""
+    size = max(1, _TOGETHER // samples)
     for first in range(0, len(indices), size):
         yield indices[first : first + size]
 
