@@ -104,8 +104,9 @@ def blob_frames(mask: np.ndarray, min_radius: float, max_radius: float) -> np.nd
     shortest = max(_MINIMUM_PERIMETER, _CHORD * min_radius)
     longest = 2 * np.pi * (max_radius + _SLACK)
     ellipses = []
-    for index, contour in enumerate(contours):
-        if not shortest <= len(contour) <= longest or hierarchy[0, index, 3] >= 0:
+    parents = hierarchy[0, :, 3].tolist() if contours else []
+    for contour, parent in zip(contours, parents, strict=True):
+        if parent >= 0 or not shortest <= contour.shape[0] <= longest:
             continue
         area, perimeter = cv2.contourArea(contour), cv2.arcLength(contour, closed=True)
         if 4 * np.pi * area < _MINIMUM_ROUNDNESS * perimeter**2:
@@ -193,6 +194,7 @@ def _identify_dots(
     major, _, _ = ellipse_axes(frames)
     minimum, maximum = settings.radii
     shown = (minimum <= major) & (major <= maximum) & readings.surrounded
+    shown &= settings.report_undecoded | (ids != UNDECODED)
     confidence = np.where(ids == UNDECODED, 0.0, readings.certainty)
     codes = code.canonical(readings.words)
     return targets_from_frames(
@@ -209,7 +211,9 @@ def _resolve(targets: list[Target], code: Family) -> list[Target]:
     x, y, major = np.array([(it.x, it.y, it.semi_major) for it in read]).reshape(-1, 3).T
     best = set(best_targets(read))
     return [
-        it if it in best else replace(it, id=UNDECODED, code=0, confidence=0.0)
+        it
+        if it.id == UNDECODED or it in best
+        else replace(it, id=UNDECODED, code=0, confidence=0.0)
         for it in targets
         if it.id != UNDECODED or (np.hypot(x - it.x, y - it.y) > code.band_outer * major).all()
     ]
