@@ -33,6 +33,7 @@ from ahf_ros.features.array_record import ArrayRecord
 from ahf_ros.features.circle_fit import fit_circles, fit_dots
 from ahf_ros.features.ellipse_targets import targets_from_frames
 from ahf_ros.features.frame import affine_frames, circle_points, ellipse_axes, project
+from ahf_ros.features.outlines import measured
 from ahf_ros.features.sampling import sample, within
 from ahf_ros.imaging.image import as_gray, check_image, stretched_to_8_bit
 from ahf_ros.target import UNDECODED, Target, sorted_targets
@@ -103,19 +104,21 @@ def blob_frames(mask: np.ndarray, min_radius: float, max_radius: float) -> np.nd
     contours, hierarchy = cv2.findContours(mask, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
     shortest = max(_MINIMUM_PERIMETER, _CHORD * min_radius)
     longest = 2 * np.pi * (max_radius + _SLACK)
-    ellipses = []
     parents = hierarchy[0, :, 3].tolist() if contours else []
-    for contour, parent in zip(contours, parents, strict=True):
-        if parent >= 0 or not shortest <= contour.shape[0] <= longest:
-            continue
-        area, perimeter = cv2.contourArea(contour), cv2.arcLength(contour, closed=True)
-        if 4 * np.pi * area < _MINIMUM_ROUNDNESS * perimeter**2:
-            continue
-        (x, y), (width, height), angle = cv2.fitEllipse(contour)
-        if abs(np.pi / 4 * width * height - area) < _MAXIMUM_MISFIT * area:
-            # A contour runs through the centres of a blob's outermost pixels, half a pixel inside.
-            ellipses.append((x, y, (width + 1) / 2, (height + 1) / 2, np.deg2rad(angle)))
-    return affine_frames(*np.reshape(ellipses, (-1, 5)).T)
+    outlines = [
+        contour
+        for contour, parent in zip(contours, parents, strict=True)
+        if parent < 0 and shortest <= contour.shape[0] <= longest
+    ]
+    areas, perimeters, _ = measured(outlines)
+    areas = np.abs(areas)
+    which = np.flatnonzero(4 * np.pi * areas >= _MINIMUM_ROUNDNESS * perimeters**2)
+    ellipses = [cv2.fitEllipse(outlines[index]) for index in which]
+    columns = [(*centre, *axes, angle) for centre, axes, angle in ellipses]
+    x, y, width, height, angle = np.reshape(columns, (-1, 5)).T
+    good = np.abs(np.pi / 4 * width * height - areas[which]) < _MAXIMUM_MISFIT * areas[which]
+    # A contour runs through the centres of a blob's outermost pixels, half a pixel inside.
+    return affine_frames(x, y, (width + 1) / 2, (height + 1) / 2, np.deg2rad(angle))[good]
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,6 +15,7 @@ import cv2
 import numpy as np
 
 from ahf_ros.detectors.square.frames import meet
+from ahf_ros.features.outlines import measured, points_of
 from ahf_ros.features.sampling import sample
 from ahf_ros.imaging.logarithm import LOG_OFFSET
 
@@ -92,7 +93,7 @@ def _outlines(dark: np.ndarray) -> list[np.ndarray]:
 
 def _regions(outlines: list[np.ndarray], growths: np.ndarray) -> _Regions:
     """Return the regions in outlines that may have four straight sides."""
-    areas, lengths, boxes = _measured(outlines)
+    areas, lengths, boxes = measured(outlines)
     areas = -areas  # of holes negative
     solid = areas >= _SOLID * lengths**2 / 16
     likely = lengths <= _TATTERED * boxes.sum(axis=1)
@@ -102,7 +103,7 @@ def _regions(outlines: list[np.ndarray], growths: np.ndarray) -> _Regions:
         outlines[index] if solid[index] else cv2.convexHull(outlines[index])
         for index in which.tolist()
     ]
-    areas, lengths, _ = _measured(around)
+    areas, lengths, _ = measured(around)
     areas = np.abs(areas)
     large = areas >= np.maximum(_SOLID * lengths**2 / 16, _SMALLEST**2 / 2)
     tolerances = np.maximum(_TOLERANCE * lengths, 1.0)
@@ -110,7 +111,7 @@ def _regions(outlines: list[np.ndarray], growths: np.ndarray) -> _Regions:
         cv2.approxPolyDP(around[index], tolerances[index], closed=True)
         for index in np.flatnonzero(large).tolist()
     ]
-    turned = _measured(polygons)[0] <= 0
+    turned = measured(polygons)[0] <= 0
     counts = np.array([*map(len, polygons)])
     some = np.flatnonzero((counts >= 4) & (counts <= _MAXIMUM_CORNERS))
     kept = np.flatnonzero(large)[some]
@@ -122,25 +123,6 @@ def _regions(outlines: list[np.ndarray], growths: np.ndarray) -> _Regions:
         areas[kept],
         growths[which],
     )
-
-
-def _measured(outlines: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return areas, positive for those clockwise in the image, lengths, and sides of boxes, px."""
-    points = _points(outlines)
-    counts = np.array([*map(len, outlines)], int)
-    first = np.cumsum(counts) - counts
-    following = np.arange(1, len(points) + 1)
-    following[first + counts - 1] = first
-    after = points[following]
-    lengths = np.add.reduceat(np.hypot(*(after - points).T), first)
-    boxes = np.maximum.reduceat(points, first) - np.minimum.reduceat(points, first) + 1
-    areas = np.add.reduceat(_cross(points, after), first, dtype=np.float64) / 2
-    return areas, lengths, boxes
-
-
-def _points(outlines: list[np.ndarray]) -> np.ndarray:
-    """Return the points of outlines, one after the other, shape (n, 2)."""
-    return np.concatenate([np.zeros((0, 1, 2), np.int32), *outlines])[:, 0]
 
 
 def _bordered(values: np.ndarray, sides: np.ndarray, regions: np.ndarray) -> np.ndarray:
@@ -178,7 +160,7 @@ def _four_sides(regions: _Regions) -> tuple[np.ndarray, np.ndarray]:
     counts = np.array([*map(len, regions.polygons)], int)
     used = np.arange(_MAXIMUM_CORNERS) < counts[:, None]
     starts = np.zeros((*used.shape, 2))
-    starts[used] = _points(regions.polygons)
+    starts[used] = points_of(regions.polygons)
     ends = np.roll(starts, -1, axis=1)
     ends[np.arange(len(counts)), counts - 1] = starts[:, 0]
     vectors = np.where(used[..., None], ends - starts, 0)
@@ -231,7 +213,7 @@ def _lines(regions: _Regions, which: np.ndarray, sides: np.ndarray) -> np.ndarra
     outlines = [regions.outlines[index] for index in which]
     counts = [*map(len, outlines)]
     first = np.cumsum([0, *counts[:-1]])
-    points = _points(outlines).astype(np.float64)
+    points = points_of(outlines).astype(np.float64)
     vectors = sides[:, :, 1] - sides[:, :, 0]
     lengths = np.hypot(vectors[..., 0], vectors[..., 1])
     along = vectors / lengths[..., None]
