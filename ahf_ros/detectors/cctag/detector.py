@@ -123,16 +123,24 @@ class CctagDetector(FamilyDetector):
             for family in self.design:
                 frames = likely_rings(glances, octave.radii, polarity, family)
                 rings, light = _identified(gray, frames, polarity, family)
-                rings = _owned(light, _single(_together(rings)), polarity, family)
+                rings = _single(_together(rings))
+                if not self._shown(rings).any():  # rivals and pixels make none sure without others
+                    continue
+                rings = _owned(light, rings, polarity, family)
                 rings = contested(gray, rings, polarity, family)
-                found += self._shown(_single(rings), family.name)
+                found += self._targets(_single(rings), family.name)
         return found
 
-    def _shown(self, rings: Aligned, family: str) -> list[Target]:
+    def _shown(self, rings: Aligned) -> np.ndarray:
+        """Return which readings are sure enough to be reported, (k,)."""
+        undecoded = self.settings.report_undecoded & (rings.of_target >= _SURE_OF_TARGET)
+        shown: np.ndarray = undecoded | (rings.confidence >= _CERTAIN)
+        return shown
+
+    def _targets(self, rings: Aligned, family: str) -> list[Target]:
         """Return the targets of the readings that are sure enough."""
+        rings = rings.select(self._shown(rings))
         decoded = rings.confidence >= _CERTAIN
-        shown = decoded | (self.settings.report_undecoded & (rings.of_target >= _SURE_OF_TARGET))
-        rings, decoded = rings.select(shown), decoded[shown]
         ids = np.where(decoded, rings.ids, UNDECODED)
         certainty = np.where(decoded, rings.confidence, 0.0)
         return targets_from_frames(

@@ -83,6 +83,7 @@ _BY_SIZE, _USUAL_SIZE = 2.5, 12.0  # what `plain` grows by ln of the radius, fro
 _USUAL_BLURS = 14.0  # the same radius, in standard deviations of the usual blur
 _AS_CLEAR = -6.0  # as it gets, by anything that is round
 _HOPELESS = 1e-6, 1e-4  # probabilities of a target, up to which one ID and few IDs are enough
+_UNLIKELY = 1e-3  # the same, up to which no place is settled, which hardly changes it
 _FEW_READINGS = 2  # IDs that are brought onto the image before the others
 _OF_ID = np.array([-1.4, 1.2])  # of one, margin
 
@@ -272,8 +273,9 @@ def identify(
     index[rows, columns] = np.arange(len(rows))
     best = every.select(index[np.arange(len(ids)), cost.argmin(axis=1)])
     next_best = np.where(ids == best.ids[:, None], np.inf, cost).min(axis=1)
-    best = _settled(gray, best, family, prior, lights)
     best = replace(best, margin=next_best - cost.min(axis=1))
+    likely = (best.of_target > _UNLIKELY) & (best.colour == polarity)
+    best = _settled(gray, best.select(likely), family, prior, lights.select(likely))
     return best.select(best.colour == polarity)
 
 
@@ -295,7 +297,8 @@ def _settled(
         again = align(gray, some.frames, some.ids, some.edges, family, prior, light)
         away = again.frames[:, :2, 2] - some.frames[:, :2, 2]
         spread = away[:, :, None] * away[:, None]
-        again = replace(again, covariance=again.covariance + spread)
+        covariance = again.covariance + spread
+        again = replace(again, covariance=covariance, margin=some.margin)
         rings = rings.replaced(moving, again)
         moving = moving[
             (away**2).sum(axis=1)
