@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from ahf_ros.codes.cctag import circle_family
-from ahf_ros.detectors.cctag.glance import Glance, likely_rings
+from ahf_ros.detectors.cctag.glance import Circles, likely_rings
 from ahf_ros.features import frame
 from ahf_ros.features.dots import Dots
 from ahf_ros.synthetic.scene import Rendering
@@ -26,10 +26,11 @@ def frames_from(shown: Rendering, radius: float, polarity: int) -> np.ndarray:
     [target] = shown.targets
     size = radius * target.semi_major
     start = frame.affine_frames(*np.array([[target.x, target.y, size, size, 0.0]]).T)
-    glance = Glance.at(
+    circles = Circles.at(
         shown.image.astype(np.float32), Dots(start, np.array([polarity]), np.ones(1))
     )
-    return likely_rings([glance], BOUNDS, 1, circle_family('cctag4'))
+    [[found]] = likely_rings(circles, [BOUNDS], [(1, circle_family('cctag4'))])
+    return found
 
 
 @pytest.mark.parametrize('index', [0, 1, 3, 5, 7])

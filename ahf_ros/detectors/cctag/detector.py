@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 from typing import ClassVar
 
 import cv2
@@ -18,11 +19,19 @@ import numpy as np
 from ahf_ros.blas import one_blas_thread
 from ahf_ros.codes import CCTAG_NAMES
 from ahf_ros.codes.cctag import CircleFamily, circle_family
-from ahf_ros.detectors.cctag.glance import Glance, likely_rings
+from ahf_ros.detectors.cctag.glance import LARGEST, Circles, likely_rings
 from ahf_ros.detectors.cctag.joint import contested, jointly
-from ahf_ros.detectors.cctag.light import EDGES
+from ahf_ros.detectors.cctag.light import EDGES, Lights
 from ahf_ros.detectors.cctag.rays import is_drawing, of_drawing
-from ahf_ros.detectors.cctag.rings import NOTHING, Aligned, Prior, align, identify, in_light
+from ahf_ros.detectors.cctag.rings import (
+    Aligned,
+    Prior,
+    align,
+    identify,
+    identify_in,
+    in_light,
+    show_the_same,
+)
 from ahf_ros.detectors.claims import best_targets
 from ahf_ros.detectors.contract import FamilyDetector, moved_targets
 from ahf_ros.features import frame
@@ -32,11 +41,14 @@ from ahf_ros.features.dots import Dots
 from ahf_ros.features.ellipse_targets import ellipse_fields, targets_from_frames
 from ahf_ros.features.large_targets import targets_of_octaves
 from ahf_ros.features.log_edges import find_edges
-from ahf_ros.features.pyramid import ImagePyramid, Octave, image_pyramid
+from ahf_ros.features.pyramid import ImagePyramid, Octave, image_pyramid, octaves
 from ahf_ros.imaging.image import as_gray, check_image
 from ahf_ros.target import UNDECODED, Target, sorted_targets
 
 _GAIN = 2  # of ln I, for circles that blur makes gray
+_COLOURS = 1, -1  # of circles that are looked for
+_SMALLEST, _SMALL = 2.0, 11.5  # radii of circles that are looked for, px, also in the half
+_BEYOND = 1.1  # times a bound of the radius, by how much circles may be beyond it
 _INNERMOST = 0.25  # of the radii of circles that are looked for
 _COMMON_CENTRE = 8.0, 20.0  # radii of targets whose rings vote together, px
 _FACING = 11.5  # distance up to which they vote, px
@@ -48,6 +60,8 @@ _SURE = 0.999  # confidence of targets that neither rivals nor another family pu
 _PROBABLE = 0.5  # confidence of targets that tell of edges together
 _POSSIBLE = 0.01  # probability of a target, from which it is read again
 _IN_A_ROW = 32  # likely frames without a target, which hardly any others precede
+_FULL, _HALVES = slice(1), slice(1, None)  # of octaves, whose images are read at once
+_BORDER = 160  # px, beyond an image, farther than circles about frames in it reach
 _CERTAIN = 0.75  # confidence from which a target is reported
 _SURE_OF_TARGET = 0.9  # probability of a target, from which it is reported without its ID
 _PLAUSIBLE = 0.6  # share of rays that agree, of a target that is measured again
@@ -74,9 +88,14 @@ class CctagDetector(FamilyDetector):
     @one_blas_thread()
     def search(self, pyramid: ImagePyramid) -> list[Target]:
         """Identify the targets of one image; see `Searching`."""
-        found = targets_of_octaves(
-            _doubled(pyramid), self.settings.radii, self._identify, self.refine
-        )
+        doubled, radii = _doubled(pyramid), self.settings.radii
+        kinds = list(product(self.settings.polarities, self.design))
+        looks = _looks(list(octaves(doubled, *radii)), kinds)
+
+        def identify(octave: Octave) -> list[Target]:
+            return self._identify(octave.pyramid.gray, looks[octave.level])
+
+        found = targets_of_octaves(doubled, radii, identify, self.refine)
         return sorted_targets(best_targets(found, 1.0))
 
     @one_blas_thread()
@@ -114,21 +133,17 @@ class CctagDetector(FamilyDetector):
             refined = moved_targets(refined, known, places, good)
         return refined
 
-    def _identify(self, octave: Octave) -> list[Target]:
+    def _identify(self, gray: np.ndarray, looks: Sequence[_Look]) -> list[Target]:
         """Return the targets of an octave, in its pixels."""
-        gray = octave.pyramid.gray
         found = []
-        glances = [Glance.at(gray, _circles(octave)), *_common_centres(octave)]
-        for polarity in self.settings.polarities:
-            for family in self.design:
-                frames = likely_rings(glances, octave.radii, polarity, family)
-                rings, light = _identified(gray, frames, polarity, family)
-                rings = _single(_together(rings))
-                if not self._shown(rings).any():  # rivals and pixels make none sure without others
-                    continue
-                rings = _owned(light, rings, polarity, family)
-                rings = contested(gray, rings, polarity, family)
-                found += self._targets(_single(rings), family.name)
+        for look in looks:
+            rings, light = _identified(gray, look)
+            rings = _single(_together(rings))
+            if not self._shown(rings).any():  # rivals and pixels make none sure without others
+                continue
+            rings = _owned(light, rings, look.polarity, look.family)
+            rings = contested(gray, rings, look.polarity, look.family)
+            found += self._targets(_single(rings), look.family.name)
         return found
 
     def _shown(self, rings: Aligned) -> np.ndarray:
@@ -149,16 +164,88 @@ class CctagDetector(FamilyDetector):
         )
 
 
-def _identified(
-    gray: np.ndarray, frames: np.ndarray, polarity: int, family: CircleFamily
-) -> tuple[Aligned, np.ndarray]:
+@dataclass(frozen=True, slots=True)
+class _Look:
+    """What looks like targets of one colour and family in an octave."""
+
+    polarity: int
+    family: CircleFamily
+    frames: np.ndarray  # (k, 3, 3), the likeliest first
+    lights: Lights  # about those of the first that may be targets, of one edge at the most
+
+
+def _looks(
+    of_octaves: Sequence[Octave], kinds: Sequence[tuple[int, CircleFamily]]
+) -> dict[int, list[_Look]]:
+    """Return what looks like targets of some colours and families, by the levels of octaves.
+
+    Halves of the image have few of them, whose light is found together.
+    """
+    if not of_octaves:
+        return {}
+    circles = [
+        Circles.at(octave.pyramid.gray, dots, number, largest)
+        for number, (octave, of) in enumerate(zip(of_octaves, _circles(of_octaves), strict=True))
+        for dots, largest in ((of, LARGEST), *_common_centres(octave))
+    ]
+    frames = likely_rings(Circles.joined(circles), [it.radii for it in of_octaves], kinds)
+    images = [it.pyramid.gray for it in of_octaves]
+    lights = [of for part in (_FULL, _HALVES) for of in _first_lights(images[part], frames[part])]
+    return {
+        octave.level: [_Look(*it) for it in zip(*zip(*kinds, strict=True), *of, strict=True)]
+        for octave, *of in zip(of_octaves, frames, lights, strict=True)
+    }
+
+
+def _first_lights(
+    images: Sequence[np.ndarray], frames: Sequence[Sequence[np.ndarray]]
+) -> list[list[Lights]]:
+    """Return light of one edge about the first frames of all kinds in images.
+
+    Frames that do not show the same all around have none. The images are read as one.
+    """
+    if not images:
+        return []
+    stacked, places = _stacked(images)
+    first = [
+        [frame.translated(it[:_IN_A_ROW], *place) for it in of]
+        for place, of in zip(places, frames, strict=True)
+    ]
+    lights = Lights.about(stacked, np.concatenate([it for of in first for it in of]), 1)
+    same, start = show_the_same(stacked, lights), 0
+    found: list[list[Lights]] = []
+    for (x, y), of in zip(places, first, strict=True):
+        found.append([])
+        for it in of:
+            some = start + np.flatnonzero(same[start : start + len(it)])
+            found[-1].append(lights.select(some).translated(-x, -y))
+            start += len(it)
+    return found
+
+
+def _stacked(images: Sequence[np.ndarray]) -> tuple[np.ndarray, list[tuple[int, int]]]:
+    """Return images above one another, with their borders repeated, and where they are, px."""
+    if len(images) == 1:
+        return images[0], [(0, 0)]
+    wide = max(it.shape[1] for it in images)
+    sides = [(_BORDER, _BORDER, _BORDER, _BORDER + wide - it.shape[1]) for it in images]
+    bordered = [
+        cv2.copyMakeBorder(it, *of, cv2.BORDER_REPLICATE)
+        for it, of in zip(images, sides, strict=True)
+    ]
+    tops = np.cumsum([_BORDER, *(len(it) for it in bordered[:-1])]).tolist()
+    return np.concatenate(bordered), [(_BORDER, top) for top in tops]
+
+
+def _identified(gray: np.ndarray, look: _Look) -> tuple[Aligned, np.ndarray]:
     """Return the readings of targets of one colour, and the image of light that they are of.
 
     A first reading knows one edge of light. Where it shows likely targets, all are read with more,
     and doubtful ones with what certain ones show.
     """
-    rings, count = _first_readings(gray, frames, polarity, family)
-    frames = frames[:count]
+    polarity, family = look.polarity, look.family
+    rings, count = _first_readings(gray, look)
+    frames = look.frames[:count]
     possible = rings.select(rings.of_target >= _POSSIBLE)
     if not len(possible.ids):
         return possible, gray
@@ -185,21 +272,19 @@ def _identified(
     return rings, light
 
 
-def _first_readings(
-    gray: np.ndarray, frames: np.ndarray, polarity: int, family: CircleFamily
-) -> tuple[Aligned, int]:
+def _first_readings(gray: np.ndarray, look: _Look) -> tuple[Aligned, int]:
     """Return readings in light of one edge at the most, and how many frames were looked at.
 
     Those that are most like rings come first, and with them the targets. Where none of so many in
     a row may be one, the others are texture.
     """
-    found = [NOTHING]
-    for start in range(0, len(frames), _IN_A_ROW):
-        some = frames[start : start + _IN_A_ROW]
-        found.append(identify(gray, some, polarity, family, most=1))
-        if not (found[-1].of_target >= _POSSIBLE).any():
-            return Aligned.joined(found), start + len(some)
-    return Aligned.joined(found), len(frames)
+    kind = look.polarity, look.family
+    found, count = [identify_in(gray, look.lights, *kind, most=1)], _IN_A_ROW
+    while (found[-1].of_target >= _POSSIBLE).any() and count < len(look.frames):
+        some = look.frames[count : count + _IN_A_ROW]
+        found.append(identify(gray, some, *kind, most=1))
+        count += _IN_A_ROW
+    return Aligned.joined(found), count
 
 
 def _readings(
@@ -294,25 +379,40 @@ def _owned(gray: np.ndarray, rings: Aligned, polarity: int, family: CircleFamily
     return replace(rings, margin=np.minimum(rings.margin, against + of_family))
 
 
-def _circles(octave: Octave) -> Dots:
-    """Return dots that may be circles of targets of any colour, in px of an octave."""
-    low, high = octave.radii
-    pyramid, colours = octave.pyramid, (1, -1)
-    least = max(low * _INNERMOST, 2.0)
-    found = [search(pyramid, least, high, colours) for search in (whole_dots, voted_dots)]
+def _circles(of_octaves: Sequence[Octave]) -> list[Dots]:
+    """Return dots that may be circles of targets of any colour, in px of each octave.
+
+    Small ones are voted for by the edges of two levels, of which the second are less noisy.
+    """
+    first, last = of_octaves[0], of_octaves[-1]
+    pyramid, low = first.pyramid, first.radii[0]
+    high = last.radii[1] * 2 ** (last.level - first.level)
+    voted = voted_dots(pyramid, max(low * _INNERMOST, _SMALLEST), high, _COLOURS)
     if len(pyramid.halves) > 1:
         gray, *halves = pyramid.halves
         half = ImagePyramid(gray, tuple(halves), pyramid.logs[1:], pyramid.edges[1:])
-        dots = voted_dots(half, max(low / 2, 2.0), high / 2, colours)
-        found.append(replace(dots, frames=frame.enlarged(dots.frames, 1)))
-    return Dots.joined(found)
+        others = voted_dots(half, max(low / 2, _SMALLEST), _SMALL, _COLOURS)
+        others = replace(others, frames=frame.enlarged(others.frames, 1))
+        voted = Dots.joined([voted, others])
+    major = frame.ellipse_axes(voted.frames)[0]
+    found = []
+    for octave in of_octaves:
+        least, largest = octave.radii[0] * _INNERMOST, octave.radii[1]
+        whole = whole_dots(octave.pyramid, max(least, _SMALLEST), largest, _COLOURS)
+        level = octave.level - first.level
+        own = major / 2**level
+        of_size = voted.select((own * _BEYOND >= least) & (own <= largest * _BEYOND))
+        reduced = replace(of_size, frames=frame.enlarged(of_size.frames, -level))
+        found.append(Dots.joined([whole, reduced]))
+    return found
 
 
-def _common_centres(octave: Octave) -> list[Glance]:
-    """Return a glance at circles about the points that the edges of many circles face.
+def _common_centres(octave: Octave) -> list[tuple[Dots, float]]:
+    """Return circles about the points that the edges of many circles face.
 
     Narrow rings are too close for a dot to be told from the next, and blur takes their contrast.
-    What they share is the centre. The colour is unknown.
+    What they share is the centre. The colour is unknown. The number is how many times larger the
+    outermost circles may be.
     """
     low, high = max(octave.radii[0], _COMMON_CENTRE[0]), min(octave.radii[1], _COMMON_CENTRE[1])
     if octave.level or low >= high:
@@ -335,7 +435,7 @@ def _common_centres(octave: Octave) -> list[Glance]:
     size = np.full(len(x), low)
     frames = frame.affine_frames(x, y, size, size, np.zeros(len(x)))
     centres = Dots(frames, np.zeros(len(x), int), np.ones(len(x)))
-    return [Glance.at(octave.pyramid.gray, centres, high / low)]
+    return [(centres, high / low)]
 
 
 def _doubled(pyramid: ImagePyramid) -> ImagePyramid:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -38,95 +39,121 @@ _EDGES: tuple[Edge, ...] = (
 _DEFOCUSED = 0.6  # blur, widths of narrow rings
 _INNERMOST, _RATIO = 0.12, 1.035  # radius from which an outermost circle is read, and to the next
 _OUTERMOST = range(-3, 2)  # steps of the radius to that of the outermost circle, where it is found
-_INNER = 0.15  # radius, of the outermost, of any other circle
 _NARROWEST = 0.5  # ring that is read, px; blur hides others
 _PROMISING = 0.6  # share of a profile that rings explain, from which they are looked at
 _OF_DISCS = 0.9  # of 1, so that of rings in one place those that leave least are looked at
 _LOOKED_AT = 2  # frames for an ID, at the most
 _APART = 0.1  # distance of the centres of different frames, radii
 _LEAST_UNLIKE = 1e-6  # of squares of gray values, of their mean
-_PART = 128  # circles that are read at a time
+_READ = 128  # circles that are read at a time
+_PART = 4096  # circles that are looked at at a time, which bounds the memory
+LARGEST = 1 / 0.15
+"""Radius of the outermost circle, in radii of any other."""
+_STEPS = np.arange(_OUTERMOST[0], math.ceil(math.log(LARGEST, SIZE_STEP)) + 1)
+"""Steps of the radius of a circle to that of the outermost circle."""
+_BOUNDS = _INNERMOST * SIZE_STEP ** _STEPS[0], PROFILE[-1] * SIZE_STEP ** _STEPS[-1]
+_RADII = np.geomspace(*_BOUNDS, math.ceil(math.log(_BOUNDS[1] / _BOUNDS[0], _RATIO)))
+"""Radii of profiles about circles."""
+
+_Likely = tuple[np.ndarray, np.ndarray]  # frames (k, 3, 3), and how much likelier than discs
 
 
 @dataclass(frozen=True, slots=True)
 class Circles(ArrayRecord):
-    """Circles, the smallest first, and mean profiles about them."""
+    """Circles, and mean profiles about them."""
 
     frames: np.ndarray  # (k, 3, 3)
     polarity: np.ndarray  # int, (k,), 0 if it is unknown
-    step: np.ndarray  # int, (k,), of radii
+    octave: np.ndarray  # int, (k,), the number of that in whose px they are
+    highest: np.ndarray  # int, (k,), steps to the largest outermost circle
     profiles: np.ndarray  # float32, (k, n), of rays in their own light, most of like ones
 
-
-@dataclass(frozen=True, slots=True)
-class Glance:
-    """Circles, and the steps from their radii to those that outermost circles may have."""
-
-    circles: Circles
-    steps: range
-    radii: np.ndarray  # of profiles, (n,)
-
     @staticmethod
-    def at(gray: np.ndarray, dots: Dots, largest: float = 1 / _INNER) -> Glance:
-        """Return a glance at dots; outermost circles may be up to so many times larger."""
-        last = math.ceil(math.log(largest) / math.log(SIZE_STEP))
-        steps = range(_OUTERMOST[0], last + 1)
-        low, high = (SIZE_STEP**step for step in (steps[0], steps[-1]))
-        low, high = math.log(_INNERMOST * low), math.log(PROFILE[-1] * high)
-        radii = np.exp(np.linspace(low, high, math.ceil((high - low) / math.log(_RATIO))))
-        step = size_steps(frame.mean_radii(dots.frames))
-        order = np.argsort(step, kind='stable')
-        dots = dots.select(order)
-        own = int(np.searchsorted(radii, PROFILE[-1]))
+    def at(gray: np.ndarray, dots: Dots, octave: int = 0, largest: float = LARGEST) -> Circles:
+        """Return the circles of dots; outermost circles may be up to so many times larger."""
+        highest = math.ceil(math.log(largest, SIZE_STEP))
+        radii = _RADII[: np.searchsorted(_RADII, PROFILE[-1] * SIZE_STEP**highest) + 1]
+        count, own = len(dots.frames), int(np.searchsorted(radii, PROFILE[-1]))
         share = np.gradient(radii[:own]).astype(np.float32)
-        profiles = np.empty((len(order), len(radii)), np.float32)
-        for start in range(0, len(order), _PART):
-            part = slice(start, start + _PART)
+        profiles = np.zeros((count, len(_RADII)), np.float32)
+        for start in range(0, count, _READ):
+            part = slice(start, start + _READ)
             seen = sample_circles(gray, dots.frames[part], ANGLES[::_EVERY], radii)
             np.maximum(seen, 0, out=seen)
             seen /= np.maximum(seen[..., :own] @ share / share.sum(), 1)[..., None]
             unlike = (seen[..., :own] - seen[..., :own].mean(axis=1, keepdims=True)) ** 2 @ share
             weight = 1 / (unlike + np.median(unlike, axis=1, keepdims=True) + _LEAST_UNLIKE)
-            profiles[part] = (weight[:, None] @ seen)[:, 0]
-        return Glance(Circles(dots.frames, dots.polarity, step[order], profiles), steps, radii)
+            profiles[part, : len(radii)] = (weight[:, None] @ seen)[:, 0]
+        octaves, steps = (np.full(count, of) for of in (octave, highest))
+        return Circles(dots.frames, dots.polarity, octaves, steps, profiles)
 
-    def likely(
-        self, radii: tuple[float, float], polarity: int, family: CircleFamily
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Return likely frames of outermost circles, and how much likelier they are than discs."""
-        circles, ups = self.circles, np.array(self.steps)
-        sign = np.where(ups < _OUTERMOST.stop, polarity, -polarity)
-        factor = SIZE_STEP**ups
-        major = frame.ellipse_axes(circles.frames)[0][:, None] * factor
-        narrow = frame.mean_radii(circles.frames)[:, None] * factor * family.narrow
-        tried = (major >= radii[0]) & (major <= radii[1]) & (narrow >= _NARROWEST)
-        tried &= circles.polarity[:, None] * sign >= 0
-        row, up = np.nonzero(tried)
+
+@dataclass(frozen=True, slots=True)
+class _Outermost(ArrayRecord):
+    """Outermost circles that targets of circles may have."""
+
+    circle: np.ndarray  # int, (k,), row
+    octave: np.ndarray  # int, (k,), as that of the circle
+    sign: np.ndarray  # int, (k,), the polarity, or 0 if it is unknown
+    factor: np.ndarray  # (k,), of the radius
+    radius: np.ndarray  # (k,), mean, px
+    profiles: np.ndarray  # float32, (k, m), weighted
+
+    @staticmethod
+    def of(circles: Circles, radii: Sequence[tuple[float, float]]) -> _Outermost:
+        """Return those whose semi-major axes are within the radii, px, of their octaves."""
+        low, high = np.array(radii)[circles.octave].T[..., None]
+        major = frame.ellipse_axes(circles.frames)[0][:, None] * SIZE_STEP**_STEPS
+        tried = (major >= low) & (major <= high) & (circles.highest[:, None] >= _STEPS)
+        row, step = np.nonzero(tried)
+        factor = SIZE_STEP ** _STEPS[step]
+        resampled = (circles.profiles @ _resampling()).reshape(*tried.shape, -1)
+        return _Outermost(
+            circle=row,
+            octave=circles.octave[row],
+            sign=circles.polarity[row] * np.where(_STEPS[step] < _OUTERMOST.stop, 1, -1),
+            factor=factor,
+            radius=frame.mean_radii(circles.frames)[row] * factor,
+            profiles=resampled[row, step],
+        )
+
+    def better(self, polarity: int, family: CircleFamily) -> np.ndarray:
+        """Return how much likelier the rings of a family are than discs, (k,), 0 if unlikely."""
+        narrow = family.narrow * self.radius
+        tried = np.flatnonzero((narrow >= _NARROWEST) & (self.sign * polarity >= 0))
         sharp = tuple((polarity * of[0], *of[1:3], polarity * of[3]) for of in _EDGES)
-        resampled = [polarity * self._resampled(by) for by in self.steps]
-        better = np.zeros(len(row))
-        for size, some in by_value(circles.step[row] + ups[up]):
-            profiles = np.empty((len(some), len(PROFILE[::_EVERY])), np.float32)
-            for by, of in by_value(up[some]):
-                profiles[of] = circles.profiles[row[some[of]]] @ resampled[by]
-            better[some] = _better(profiles, family, size, sharp)
+        better = np.zeros(len(narrow))
+        for size, of_size in by_value(size_steps(self.radius[tried])):
+            some = tried[of_size]
+            profiles = polarity * self.profiles[some]
+            found = _better(profiles, family, size, sharp)
             soft = _DEFOCUSED * family.narrow * SIZE_STEP**size
             if soft > _EDGES[0][1]:
-                left = np.flatnonzero(better[some] == 0)
+                left = np.flatnonzero(found == 0)
                 defocused = ((0.0, soft, 0.0, 0.0),)
                 # Those in focus come first.
-                better[some[left]] = 0.5 * _better(profiles[left], family, size, defocused)
-        likely = np.flatnonzero(better)
-        frames = frame.scaled(circles.frames[row[likely]], factor[up[likely]])
-        return frames, better[likely] * frame.mean_radii(frames)
+                found[left] = 0.5 * _better(profiles[left], family, size, defocused)
+            better[some] = found
+        return better * self.radius
 
-    def _resampled(self, by: int) -> np.ndarray:
-        """Return what makes weighted profiles of circles so many steps larger, (n, m)."""
-        ratio = math.log(self.radii[1] / self.radii[0])
-        at = np.log(PROFILE[::_EVERY] * SIZE_STEP**by / self.radii[0]) / ratio
-        places = np.arange(len(self.radii))
-        away = np.abs(at.clip(0, places[-1])[:, None] - places)
-        return less_lines(np.maximum(1 - away, 0).T, _EVERY)
+
+@lru_cache(maxsize=1)
+def _resampling() -> np.ndarray:
+    """Return what makes weighted profiles of circles of all steps of radii, (n, steps m)."""
+    at = PROFILE[::_EVERY] * SIZE_STEP ** _STEPS[:, None]
+    places = np.log(at / _RADII[0]) / math.log(_RADII[1] / _RADII[0])
+    last = len(_RADII) - 1
+    away = np.abs(places.clip(0, last)[..., None] - np.arange(last + 1))
+    resampled = less_lines(np.maximum(1 - away, 0).swapaxes(1, 2), _EVERY)
+    return np.ascontiguousarray(resampled.swapaxes(0, 1).reshape(len(_RADII), -1))
+
+
+@lru_cache(maxsize=512)
+def _templates(
+    family: CircleFamily, size: int, edges: tuple[Edge, ...]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return templates of rings and of discs; all sizes of both families have their place."""
+    return templates(family, size, edges, _EVERY)[0], discs(size, edges, _EVERY)
 
 
 def _better(
@@ -136,30 +163,57 @@ def _better(
 
     It is 0 of what is not like rings.
     """
-    share = shares_of(profiles, templates(family, size, edges, _EVERY)[0], most=0).max(axis=1)
+    of_rings, of_any_disc = _templates(family, size, edges)
+    better = np.zeros(len(profiles))
+    share = shares_of(profiles, of_rings, most=0).max(axis=1)
     likely = np.flatnonzero(share >= _PROMISING)
-    of_discs = shares_of(profiles[likely], discs(size, edges, _EVERY)).max(axis=1)
-    better = np.zeros(len(share))
+    if not len(likely):
+        return better
+    of_discs = shares_of(profiles[likely], of_any_disc).max(axis=1)
     less = _OF_DISCS * np.log1p(-of_discs) - np.log1p(-share[likely])
     better[likely] = np.where(share[likely] > of_discs, less, 0)
     return better
 
 
 def likely_rings(
-    glances: Sequence[Glance], radii: tuple[float, float], polarity: int, family: CircleFamily
-) -> np.ndarray:
-    """Return the frames of outermost circles whose mean profile looks like rings, (k, 3, 3).
+    circles: Circles,
+    radii: Sequence[tuple[float, float]],
+    kinds: Sequence[tuple[int, CircleFamily]],
+) -> list[list[np.ndarray]]:
+    """Return the frames of outermost circles whose mean profile looks like rings, (k, 3, 3) each.
 
-    The bounds are those of the semi-major axis. An ID is there once, so that some times as many
-    frames are enough, those that are most like rings and least like discs.
+    They are those of octaves, and in each of kinds: polarities and families. The bounds of octaves
+    are those of the semi-major axis, px. An ID is there once, so that some times as many frames
+    are enough, those that are most like rings and least like discs.
     """
-    found = [of.likely(radii, polarity, family) for of in glances]
-    frames, better = (np.concatenate(of) for of in zip(*found, strict=True))
+    found: list[list[list[_Likely]]] = [[[] for _ in kinds] for _ in radii]
+    order = np.argsort(frame.mean_radii(circles.frames), kind='stable')
+    for start in range(0, max(len(order), 1), _PART):
+        part = circles.select(order[start : start + _PART])
+        tried = _Outermost.of(part, radii)
+        for number, kind in enumerate(kinds):
+            better = tried.better(*kind)
+            for octave, of_octave in enumerate(found):
+                some = np.flatnonzero((better != 0) & (tried.octave == octave))
+                frames = frame.scaled(part.frames[tried.circle[some]], tried.factor[some])
+                of_octave[number].append((frames, better[some]))
+    return [
+        [
+            _best(parts, _LOOKED_AT * len(kind[1].numbers))
+            for parts, kind in zip(of, kinds, strict=True)
+        ]
+        for of in found
+    ]
+
+
+def _best(parts: Sequence[_Likely], most: int) -> np.ndarray:
+    """Return the best frames of different places."""
+    frames, better = (np.concatenate(of) for of in zip(*parts, strict=True))
     size, centres = frame.mean_radii(frames), frames[:, :2, 2]
     kept: list[int] = []
     free = np.ones(len(size), bool)
     for index in np.argsort(-better, kind='stable').tolist():
-        if len(kept) == _LOOKED_AT * len(family.numbers):
+        if len(kept) == most:
             break
         if free[index]:
             away = np.hypot(*(centres - centres[index]).T)

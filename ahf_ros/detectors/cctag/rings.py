@@ -21,7 +21,6 @@ from ahf_ros.detectors.cctag.rays import (
     ANGLES,
     PROFILE,
     Rays,
-    Seen,
     robust_rays,
 )
 from ahf_ros.detectors.cctag.templates import (
@@ -230,10 +229,20 @@ def identify(
 
     The light about each has so many edges at the most.
     """
-    if not len(frames):
-        return NOTHING
     lights = Lights.about(gray, frames, most)
-    lights = lights.select(_shared(lit(gray, lights.moved, lights)) >= _SHARED)
+    lights = lights.select(show_the_same(gray, lights))
+    return identify_in(gray, lights, polarity, family, prior, most)
+
+
+def identify_in(
+    gray: np.ndarray,
+    lights: Lights,
+    polarity: int,
+    family: CircleFamily,
+    prior: Prior = _USUAL,
+    most: int = EDGES,
+) -> Aligned:
+    """Return what `identify` does where the light is known."""
     if not len(lights.frames):
         return NOTHING
     starts, ids, edges, rings = likely_ids(gray, lights, polarity, family, prior)
@@ -362,11 +371,12 @@ def _unlike_discs(profiles: np.ndarray, shares: np.ndarray, frames: np.ndarray) 
     return rings
 
 
-def _shared(seen: Seen) -> np.ndarray:
-    """Return the share of what rays show that is the same on all of them, shape (k,)."""
-    means, rays = less_lines(seen.values.mean(axis=1)), less_lines(seen.values)
-    shared: np.ndarray = (means**2).sum(axis=1) / (rays**2).sum(axis=2).mean(axis=1)
-    return shared
+def show_the_same(gray: np.ndarray, lights: Lights) -> np.ndarray:
+    """Return whether most of what rays show in a light is the same on all of them, shape (k,)."""
+    values = lit(gray, lights.moved, lights).values
+    means, rays = less_lines(values.mean(axis=1)), less_lines(values)
+    same: np.ndarray = (means**2).sum(axis=1) >= _SHARED * (rays**2).sum(axis=2).mean(axis=1)
+    return same
 
 
 def in_light(gray: np.ndarray, rings: Aligned, family: CircleFamily) -> np.ndarray:
