@@ -46,7 +46,7 @@ from ahf_ros.imaging.image import as_light
 _TRIED_SHIFTS = -1.2, -0.6, 0.0, 0.6, 1.2  # deviations
 _TRIED_BLURS, _TRIED_SHARPENINGS = (-1.0, 0.0, 1.4), (3.0, 7.0)  # the same
 _GROWN = (0.85, 0.9, 0.95, 1.0, 1.05)  # radii of the outermost circle, where that was found
-_PART = 2048, 48  # hypotheses and targets at a time, which bounds the memory
+_PART = 512, 48  # frames of all scales and targets at a time, which bounds the memory
 _SHARED = 0.55  # share of what rays show, that is the same on all, from which they are read
 _CLEARLY = 0.03  # `left` by which rings must be better explained
 _TELLING_OF_GAMMA = 16  # targets
@@ -253,6 +253,8 @@ def identify_in(
     # The likeliest ID often brings the frame to its place even if it is the wrong one.
     first = align(gray, starts[:, 0], ids[:, 0], edges[:, 0], family, prior, lights)
     likely = first.of_target > _HOPELESS[0]
+    if not likely.any():
+        return NOTHING
     lights = Lights.about(gray, first.frames[likely], most)
     again = likely_ids(gray, lights, polarity, family, prior)[:3]
     starts, ids, edges = (
@@ -332,23 +334,28 @@ def likely_ids(
     """
     frames = lights.moved
     shape = len(_SCALES), len(frames), len(family.numbers)
+    each = np.tile(np.arange(len(frames)), len(_SCALES))
+    scaled = frame.scaled(frames[each], np.repeat(_SCALES, len(frames)))
+    profiles = np.empty((len(each), len(PROFILE)), np.float32)
+    clipped = np.empty(len(each), bool)
     shares, edges = np.empty(shape), np.empty((*shape, 3))
-    profiles = np.empty((*shape[:2], len(PROFILE)), np.float32)
-    scaled = np.stack([frame.scaled(frames, np.full(len(frames), of)) for of in _SCALES])
-    for of_scale, profile, share, edge in zip(scaled, profiles, shares, edges, strict=True):
-        seen = lit(gray, of_scale, lights)
-        profile[:] = less_lines(polarity * seen.values.mean(axis=1, dtype=np.float64))
-        for step, of_size in by_value(size_steps(frame.mean_radii(of_scale))):
-            for clipped in (0, 1):
-                some = of_size[seen.clipped[of_size] == clipped]
-                if not len(some):
-                    continue
-                of_rings, tried = templates(family, step, prior.tried(polarity * clipped))
-                found = shares_of(profile[some], of_rings, most=0)
-                found = found.reshape(len(some), -1, len(family.numbers))
-                share[some], edge[some] = found.max(axis=1), tried[found.argmax(axis=1)]
+    of_each, edges_of_each = (of.reshape(len(each), *of.shape[2:]) for of in (shares, edges))
+    for start in range(0, len(each), _PART[0]):
+        part = slice(start, start + _PART[0])
+        seen = lit(gray, scaled[part], lights.select(each[part]))
+        profiles[part] = less_lines(polarity * seen.values.mean(axis=1, dtype=np.float64))
+        clipped[part] = seen.clipped
+    for step, of_size in by_value(size_steps(frame.mean_radii(scaled))):
+        for of in (0, 1):
+            some = of_size[clipped[of_size] == of]
+            if not len(some):
+                continue
+            of_rings, tried = templates(family, step, prior.tried(polarity * of))
+            found = shares_of(profiles[some], of_rings, most=0)
+            found = found.reshape(len(some), -1, shape[2])
+            of_each[some], edges_of_each[some] = found.max(axis=1), tried[found.argmax(axis=1)]
     rows = np.arange(len(frames))
-    profile = profiles[shares.max(axis=2).argmax(axis=0), rows]
+    profile = profiles[shares.max(axis=2).argmax(axis=0) * len(frames) + rows]
     rings = _unlike_discs(profile, shares.max(axis=(0, 2)), frames)
     order = np.argsort(-shares.max(axis=0), axis=1, kind='stable')[:, :count]
     # Where narrow and wide rings take turns, growth of the ink makes one word the other.
@@ -357,7 +364,7 @@ def likely_ids(
     scale = shares.argmax(axis=0)[rows, order]
     found = edges[scale, rows, order]
     found[..., 1] = prior.blur
-    return scaled[scale, rows], order, found, rings
+    return scaled[scale * len(frames) + rows], order, found, rings
 
 
 def _unlike_discs(profiles: np.ndarray, shares: np.ndarray, frames: np.ndarray) -> np.ndarray:
