@@ -132,6 +132,12 @@ def test_letters_that_are_read_as_one_id_in_many_places_are_texture() -> None:
     assert create_detector(family='cctag4')(letters) == []
 
 
+def test_images_without_circles_have_no_targets() -> None:
+    slope = np.broadcast_to(np.linspace(60, 200, 120), (90, 120)).astype(np.uint8)
+    for bounds in ({}, {'min_radius': 100.0, 'max_radius': 200.0}):
+        assert create_detector(family='cctag3, cctag4', **bounds)(slope) == []
+
+
 def test_texture_is_read_no_longer_than_it_may_have_a_target(monkeypatch) -> None:
     read: list[int] = []
 

@@ -107,7 +107,8 @@ class _Outermost(ArrayRecord):
         tried = (major >= low) & (major <= high) & (circles.highest[:, None] >= _STEPS)
         row, step = np.nonzero(tried)
         factor = SIZE_STEP ** _STEPS[step]
-        resampled = (circles.profiles @ _resampling()).reshape(*tried.shape, -1)
+        resampled = circles.profiles @ _resampling()
+        resampled = resampled.reshape(*tried.shape, len(PROFILE[::_EVERY]))
         return _Outermost(
             circle=row,
             octave=circles.octave[row],
