@@ -10,6 +10,8 @@ import numpy as np
 
 from ahf_ros.codes import SQUARE_NAMES
 
+_PLAIN = 0.3  # share of the corners of cells; it is 0.5 of random cells
+
 
 def dictionary(name: str) -> Any:
     """Return a cv2.aruco.Dictionary by its name, one of `SQUARE_NAMES`.
@@ -65,6 +67,17 @@ def words(name: str) -> np.ndarray:
     count, side = len(table.bytesList), table.markerSize + 2
     prints = [cv2.aruco.generateImageMarker(table, number, side) for number in range(count)]
     return np.array(prints)[:, 1:-1, 1:-1] > 0
+
+
+@lru_cache(maxsize=64)
+def are_plain(name: str) -> np.ndarray:
+    """Return which markers of a dictionary letters and windows look like, bool, shape (k,), by ID.
+
+    What is white on them has few corners for the number of their cells.
+    """
+    cells = np.pad(words(name), ((0, 0), (1, 1), (1, 1)))
+    corners = cells[:, :-1, :-1] ^ cells[:, :-1, 1:] ^ cells[:, 1:, :-1] ^ cells[:, 1:, 1:]
+    return np.asarray(corners.mean(axis=(1, 2)) < _PLAIN)
 
 
 def borders(name: str) -> tuple[int, ...]:

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from ahf_ros.blas import one_blas_thread
-from ahf_ros.codes.square import words
+from ahf_ros.codes.square import are_plain, words
 from ahf_ros.detectors.claims import Rivals, owners
 from ahf_ros.detectors.contract import FamilyDetector, moved_targets
 from ahf_ros.detectors.square.edges import fit_edges
@@ -33,6 +33,7 @@ _SMALLEST_HALF = 24  # smaller side of a half that markers are looked for in, px
 _SAME_PLACE = 0.3  # distance of two readings of one marker, in sides
 _FITTED = 4.0  # logarithmic odds against a marker whose print was laid: half its eight unknowns
 _ALONE = 2.9  # ... one marker alone shows
+_OF_PLAIN = 4.5  # logarithmic odds that letters look like a marker, at the most, of plain ones
 _SEVERAL = 4.0  # power of their number, one in which each of several groups is there
 _LARGER = 6.9  # logarithmic odds against a larger dictionary where most markers are of a smaller
 _LARGE = 120.0  # side of a marker whose contour gives its corners to about two pixels, px
@@ -181,7 +182,8 @@ def _odds_together(readings: np.ndarray, one_place: Rivals, groups: Groups) -> n
 
     A group is there or not. One marker shows it, whichever it is, or different ones together,
     each by its lead over other groups in its place; so do those that a smaller dictionary does not
-    have for a larger one. One texture may show several, so that they need more. Where another
+    have for a larger one. One texture may show several, so that they need more. What letters and
+    windows look like shows little; three of these show a group together. Where another
     group reads the same places, the surer one is there, and of several markers of a group in one
     place, as by borders of one and two cells, one is.
     """
@@ -200,8 +202,10 @@ def _odds_together(readings: np.ndarray, one_place: Rivals, groups: Groups) -> n
         of_this = group == index
         some = number[of_this].astype(int)
         surest, whole, leading = np.zeros((3, sizes[-1]))
+        most = np.where(are_plain(names[-1]), _OF_PLAIN, inf)
         np.maximum.at(surest, some, np.minimum(lead, odds)[of_this])
         np.maximum.at(whole, some, of_group[of_this])
+        surest, whole = np.minimum(surest, most), np.minimum(whole, most)
         leading[some] = -np.inf
         np.maximum.at(leading, some, lead[of_this])
         together, shown = np.cumsum(surest)[sizes - 1], np.cumsum(surest > 0)[sizes - 1]
