@@ -48,7 +48,7 @@ _PIXELS = 0.35  # the same, px, which counts where dots are small
 _WELL = 0.25  # share of what is accepted, of a template that fits well
 _MAXIMUM_GROUPS = 2000  # of one part, for a homography to be fitted
 _MAXIMUM_TEMPLATES = 2000  # of one polarity, those that fit best
-_STRAY = 3  # dots at the positions of a target that do not belong to it
+_STRAY = 4  # dots at the positions of a target that do not belong to it
 _CELL = 2.0  # smallest one of the map of the nearest dots, px
 
 
