@@ -64,6 +64,7 @@ def test_small_targets_are_read_and_placed_under_patterns(light: str) -> None:
     assert 0.2 < relative_errors(shown, found).mean() / 2 < 2
 
 
+@pytest.mark.lasting
 def test_wrong_readings_are_put_right_by_pixels() -> None:
     shown = scene(**STRIPES)
     right = rings_of(shown)
@@ -77,6 +78,7 @@ def test_wrong_readings_are_put_right_by_pixels() -> None:
     assert (read.confidence[:3] > 0.9).all()
 
 
+@pytest.mark.lasting
 def test_what_is_no_target_is_refused_by_pixels() -> None:
     shown = scene()
     dot = (60, 60)
@@ -106,6 +108,7 @@ def test_few_targets_and_none_stay_as_they_are_read() -> None:
     assert len(jointly(as_float(shown), none, family).ids) == 0
 
 
+@pytest.mark.lasting
 @pytest.mark.parametrize('gain', [0.15, 1.0])
 @pytest.mark.parametrize('amount', [0.0, 0.7])
 def test_dark_and_sharpened_images_are_explained(gain: float, amount: float) -> None:
@@ -118,6 +121,7 @@ def test_dark_and_sharpened_images_are_explained(gain: float, amount: float) -> 
     assert np.sqrt((errors(shown, found) ** 2).mean()) < (0.02 if gain == 1.0 else 0.03)
 
 
+@pytest.mark.lasting
 @pytest.mark.parametrize('radius', [15.0, 30.0, 60.0])
 def test_drawings_are_read(radius: float) -> None:
     ids, fine = [0, 42, 85, 127], 8
