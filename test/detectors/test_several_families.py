@@ -215,3 +215,20 @@ def test_rings_of_a_data_file_are_rendered_and_identified(tmp_path):
         targets = detector(shown.image)
         assert matches(targets, truth)
         assert matches(list(detector.refine(shown.image, targets)), truth)
+
+
+def test_dots_found_before_their_family_is_shown_are_read_as_well() -> None:
+    """Of these twelve targets a lattice leaves some a whole outline, none of which is clear."""
+    shown = rendered(
+        SceneSettings(
+            width=1200,
+            height=900,
+            targets=12,
+            dot_radius=7.0,
+            family='aicon12',
+            light='dense_lattice',
+            seed=43,
+        )
+    )
+    found = create_detector(family=','.join(RING_NAMES))(shown.image)
+    assert {it.key for it in found} == {(it.family, it.id) for it in shown.targets}

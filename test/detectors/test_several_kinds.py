@@ -128,6 +128,13 @@ def test_doubtful_targets_of_few_are_no_evidence_for_a_family() -> None:
     assert evident([*doubtful, *sure, undecoded]) == [*sure, undecoded]
 
 
+@pytest.mark.parametrize('name', ['metashape12', 'apriltag_36h11'])
+def test_a_lone_target_is_identified_among_all_families(name: str) -> None:
+    shown = rendered(replace(SMALL, family=name, targets=1))
+    found = create_identifier(family='auto').identify(shown.image)
+    assert [it.key for it in found.targets] == [(name, shown.targets[0].id)]
+
+
 @pytest.mark.parametrize(
     ('confidences', 'shown'),
     [((), False), ((0.94,), False), ((0.8, 0.89), False), ((0.995,), True), ((0.94, 0.95), True)],

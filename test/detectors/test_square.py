@@ -120,6 +120,26 @@ def test_letters_are_no_markers_with_few_edges(family, seed):
     assert create_detector(family=family)(textured_image(seed)) == []
 
 
+def test_letters_show_no_dictionary():
+    """Narrow 0 and 8 are ID 1023 and 975 of aruco_original."""
+    page = np.full((200, 900), 220, np.uint8)
+    for column in range(8):
+        letter = np.where(marker('aruco_original', (1023, 975)[column % 2], 1), 220, 50)
+        letter = cv2.resize(letter.astype(np.uint8), (60, 84), interpolation=cv2.INTER_AREA)
+        page[60:144, 30 + 105 * column : 90 + 105 * column] = letter
+    page = cv2.GaussianBlur(page, (0, 0), 1.0)
+    named = create_detector(family='aruco_original')(page)
+    assert {it.id for it in named} == {975, 1023}
+    assert create_detector(family=','.join(SQUARE_NAMES))(page) == []
+
+
+@pytest.mark.parametrize('seed', [8, 9])
+def test_plain_markers_show_their_dictionary_with_others(seed):
+    shown = scene('aruco_original', seed=seed)
+    found = create_detector(family=','.join(SQUARE_NAMES))(shown.image)
+    assert counted(shown, found) == (6, 0, 0)
+
+
 def test_markers_of_an_aprilgrid_touch_squares_and_have_wide_borders():
     family = 'apriltag_36h11'
     cells, gap, count = 10, 3, 3
