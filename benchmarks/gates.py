@@ -1,6 +1,6 @@
 """Whether each gate of a detector is worth what it costs: what dies there, and what it saves.
 
-    python -m benchmarks.gates [--family ring] [--gates TEXT ...] [--pictures TEXT ...]
+    python -m benchmarks.gates [--detectors ring] [--gates TEXT ...] [--pictures TEXT ...]
 
 A gate is any comparison that drops a candidate, an outline, a dot, a reading or a word;
 `benchmarks.gate_list` lists them in order. One at a time is opened, and the pictures are
