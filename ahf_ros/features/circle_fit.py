@@ -81,9 +81,9 @@ class Fit(ArrayRecord):
         clearness: np.ndarray = self.share * (1 - self.contrast)
         return clearness
 
-    def clearest(self, most: int | None = None) -> Fit:
-        """Return the clearest targets first, so many at the most."""
-        return self.select(np.argsort(-self.clearness, kind='stable')[:most])
+    def clearest(self, most: int | None = None) -> np.ndarray:
+        """Return the indices of the clearest targets, these first, so many at the most."""
+        return np.argsort(-self.clearness, kind='stable')[:most]
 
 
 _NO_FRAMES, _NO_COVARIANCES = np.zeros((0, 3, 3)), np.zeros((0, 2, 2))

@@ -37,13 +37,14 @@ def choose_families(gray: np.ndarray, dots: Fit, families: Sequence[Family]) -> 
 
     Only their likeliest print is tried, on the likeliest of them.
     """
-    words = _words_shown(gray, dots.clearest(_CLEAREST), families, tried=1, most=_SAMPLE)
-    return present_families(words)[0]
+    clearest = dots.select(dots.clearest(_CLEAREST))
+    return present_families(_words_shown(gray, clearest, families, tried=1, most=_SAMPLE))[0]
 
 
 def further_families(gray: np.ndarray, dots: Fit, families: Sequence[Family]) -> list[Family]:
     """Return the same for dots that no family explains, most of which are none of targets."""
-    dots = dots.select(dots.share >= ENOUGH).clearest(_OTHERS)
+    dots = dots.select(dots.share >= ENOUGH)
+    dots = dots.select(dots.clearest(_OTHERS))
     if not families or not len(dots.frames):
         return []
     finest = {code.band: code.bits for code in sorted(families, key=lambda code: code.bits)}

@@ -177,7 +177,7 @@ def bands_about(images: Iterable[list[DotsOfOctave]], most: int | None = None) -
             # Those with the largest share of an outline come first.
             fits = [_fit(gray, of.select(slice(most and _TRIED * most))) for of in dots]
             fit = Fit.joined([of.select(of.share >= ENOUGH) for of in fits])
-            fit = fit.clearest(most)
+            fit = fit.select(np.sort(fit.clearest(most)))
             for start in range(0, len(fit.frames), _PART):
                 part = fit.select(slice(start, start + _PART))
                 in_gray, in_light = _bands(gray, part, index)
@@ -218,7 +218,7 @@ def with_measured_bands(
         return families
     fit = _fit(gray, dots)
     fit = fit.select(fit.share >= ENOUGH)
-    bands = _most_circular(*_bands(gray, fit.clearest(_CLEAREST), 0))
+    bands = _most_circular(*_bands(gray, fit.select(fit.clearest(_CLEAREST)), 0))
     return [
         code if code.bounds is None else _measured(bands, code, *code.bounds) for code in families
     ]

@@ -32,9 +32,9 @@ _SMALL = 28.0  # diagonal of a marker whose cells are not much larger than pixel
 _SMALLEST_HALF = 24  # smaller side of a half that markers are looked for in, px
 _SAME_PLACE = 0.3  # distance of two readings of one marker, in sides
 _FITTED = 4.0  # logarithmic odds against a marker whose print was laid: half its eight unknowns
-_ALONE = 2.9  # ... one marker alone shows
-_OF_PLAIN = 4.5  # logarithmic odds that letters look like a marker, at the most, of plain ones
 _SEVERAL = 4.0  # power of their number, one in which each of several groups is there
+_ALONE = 2.9  # ... one marker alone shows
+_OF_PLAIN = 4.5  # the most that a marker which letters look like shows, logarithmic odds
 _LARGER = 6.9  # logarithmic odds against a larger dictionary where most markers are of a smaller
 _LARGE = 120.0  # side of a marker whose contour gives its corners to about two pixels, px
 
