@@ -232,3 +232,16 @@ def test_dots_found_before_their_family_is_shown_are_read_as_well() -> None:
     )
     found = create_detector(family=','.join(RING_NAMES))(shown.image)
     assert {it.key for it in found} == {(it.family, it.id) for it in shown.targets}
+
+
+@pytest.mark.parametrize(('light', 'radius'), [('lattice', 8.0), ('dense_lattice', 12.0)])
+def test_a_lone_target_is_read_among_two_families_as_by_its_own(light: str, radius: float) -> None:
+    """Its word is certain, but to less than 0.99."""
+    size = SceneSettings(width=500, height=400, targets=1, dot_radius=radius, light=light)
+    for seed in (20, 21, 22):
+        shown = rendered(replace(size, ambient=0.12, seed=seed))
+        named, found = (
+            create_detector(family=name)(shown.image) for name in (TWO[0], ','.join(TWO))
+        )
+        assert [it.key for it in found] == [it.key for it in named]
+        assert [it.id for it in named] == [it.id for it in shown.targets]

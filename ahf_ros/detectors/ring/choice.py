@@ -23,7 +23,7 @@ from ahf_ros.features.circle_fit import ENOUGH, Fit
 _CLEAREST = 32  # dots that tell the family of an image
 _OTHERS = 1024  # clearest ones of the others: texture and letters have thousands
 _CLEAR = 0.5  # bound of the mean evidence of a reading, which spots of light hardly reach
-_DOUBTED = 0.01  # probability that all words are wrong, below which they show a family
+_DOUBTED = 0.1  # probability that all words are wrong, below which they show a family
 _ROUGH = (0.0,)  # shifts of edges that are tried to find these, px
 _SAMPLE = 8  # of those that seem to have a print, which are read first
 _LIKELIEST = 16  # dots to have a print, of which none shows that it is not there
