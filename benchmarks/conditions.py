@@ -15,6 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ahf_ros.codes import RING_NAMES
 from ahf_ros.codes.ring import FAMILY_NAMES, family, ring_family
 from ahf_ros.detectors import DetectorSettings
 from ahf_ros.synthetic.patterns import LIGHT_NAMES, benchmark_lights
@@ -24,6 +25,7 @@ from benchmarks import occluders
 from benchmarks.disturbed import blurred, compressed, noisy, overlapping
 from benchmarks.exposure import Exposure
 from benchmarks.lookalikes import LOOKALIKES
+from benchmarks.processing import phone
 from benchmarks.random_families import LIGHTS, TARGETS, random_family, sheet
 from benchmarks.sheets import COLUMNS, ROWS, mark_sheet, random_numbers, target_sheet
 
@@ -42,10 +44,21 @@ FEW = 9
 SMALL = (5.0, 20.0)
 """Smallest and largest radius of dots of these, px."""
 
+WIDTH, HEIGHT = 1600, 1066
+"""Of scenes of small dots and of photographs, px."""
+
+SHADES = (0.3, 0.12)
+"""Ambient light of these."""
+
+RADII_OF_SMALL, RADII_IN_PHOTOGRAPHS = (4.5, 9.0), (4.5, 20.0)
+"""Smallest and largest radius of dots of small targets, and in photographs, px."""
+
+PHOTOGRAPHS = 15
+"""Images of a phone, of each seed."""
+
 CELLS = COLUMNS * ROWS
 
-
-COMMON = ('light', 'drawn family', 'clean', 'exposure', 'quality')
+COMMON = ('light', 'small', 'phone', 'drawn family', 'clean', 'exposure', 'quality')
 """Conditions that most targets are under; the others are rare."""
 
 FOREIGN = ('other family', 'look-alikes', 'clutter')
@@ -85,9 +98,12 @@ def scenes(seed: int) -> Iterator[Scene]:
     for settings in lit(seed):
         rendering = render(settings)
         yield Scene('light', rendering.image, rendering.targets, settings.family)
+    yield from small(seed)
+    yield from photographed(seed)
     yield from drawn(seed)
     yield from disturbed(seed)
     yield from strange(seed)
+    yield from strange_in_light(seed)
 
 
 def lit(seed: int) -> Iterator[SceneSettings]:
@@ -109,6 +125,92 @@ def lit(seed: int) -> Iterator[SceneSettings]:
             ambient=ambient,
             seed=seed,
         )
+
+
+def small(seed: int) -> Iterator[Scene]:
+    """Yield scenes of small dots under all lights."""
+    generator = np.random.default_rng([seed, 8])
+    for light, ambient in product(LIGHT_NAMES, SHADES):
+        settings = SceneSettings(
+            width=WIDTH,
+            height=HEIGHT,
+            targets=36,
+            dot_radius=float(generator.uniform(*RADII_OF_SMALL)),
+            family=_any_family(generator),
+            polarity=str(generator.choice(['dark', 'dark', 'dark', 'bright'])),
+            blur=float(generator.uniform(0.6, 1.2)),
+            light=light,
+            light_scale=float(generator.choice([0.5, 0.8, 1.0])),
+            ambient=ambient,
+            seed=seed,
+        )
+        rendering = render(settings)
+        yield Scene('small', rendering.image, rendering.targets, settings.family)
+
+
+def photographed(seed: int) -> Iterator[Scene]:
+    """Yield scenes that a phone has processed; every third one is read as another family."""
+    generator = np.random.default_rng([seed, 9])
+    for index in range(PHOTOGRAPHS):
+        settings = SceneSettings(
+            width=WIDTH,
+            height=HEIGHT,
+            targets=24,
+            dot_radius=float(np.exp(generator.uniform(*np.log(RADII_IN_PHOTOGRAPHS)))),
+            family=_any_family(generator),
+            light=str(generator.choice(['normal', 'normal', 'shadow', 'spots', 'stripe'])),
+            ambient=0.3,
+            seed=seed * PHOTOGRAPHS + index,
+        )
+        rendering = render(settings)
+        image = phone(rendering.image, generator)
+        if index % 3:
+            yield Scene('phone', image, rendering.targets, settings.family)
+        else:
+            yield Scene('other family', image, (), _other_print(settings.family, generator))
+
+
+def strange_in_light(seed: int) -> Iterator[Scene]:
+    """Yield targets of other families under all lights, and clutter without any target."""
+    generator = np.random.default_rng([seed, 10])
+    for light, ambient in product(LIGHT_NAMES, SHADES):
+        settings = SceneSettings(
+            width=WIDTH,
+            height=HEIGHT,
+            targets=24,
+            dot_radius=float(generator.uniform(*RADII_OF_SMALL)),
+            family=_any_family(generator),
+            light=light,
+            light_scale=float(generator.choice([0.5, 0.8, 1.0])),
+            ambient=ambient,
+            seed=seed,
+        )
+        name = _other_print(settings.family, generator)
+        yield Scene('other family', render(settings).image, (), name)
+    for light in LIGHT_NAMES:
+        scale = float(generator.choice([0.3, 0.5, 0.8]))
+        settings = SceneSettings(
+            width=WIDTH,
+            height=HEIGHT,
+            targets=0,
+            distractors=30,
+            light=light,
+            light_scale=scale,
+            ambient=0.2,
+            seed=seed,
+        )
+        yield Scene('clutter', render(settings).image, (), _any_family(generator))
+
+
+def _any_family(generator: np.random.Generator) -> str:
+    return str(generator.choice(RING_NAMES))
+
+
+def _other_print(name: str, generator: np.random.Generator) -> str:
+    """Return a family whose targets do not look like those of another one."""
+    shown = family(name)
+    others = [code for code in map(family, RING_NAMES) if code.bits != shown.bits]
+    return str(generator.choice([code.name for code in others]))
 
 
 def drawn(seed: int) -> Iterator[Scene]:
@@ -164,6 +266,12 @@ def exposures() -> Iterator[tuple[str, Exposure]]:
         partial(compressed, 10),
     ):
         yield 'quality', Exposure(develop=develop)
+    for dirt in (
+        occluders.scratches(4, (0.06, 0.2)),
+        occluders.scratches(8, (0.06, 0.2)),
+        occluders.specks(25, (0.08, 0.3)),
+    ):
+        yield 'dirt', Exposure(occluder=dirt)
 
 
 def disturbed(seed: int) -> Iterator[Scene]:

@@ -32,8 +32,9 @@ def unlike_print(
 ) -> np.ndarray:
     """Return the shares of sectors in which targets are not what their words print, (k,).
 
-    Of a sector, the directions away from its borders count. Where few are marked, a third of the
-    share of these counts. All are 0 where light is uneven.
+    Of a sector, the directions away from its borders count that differ at one radius, as circles
+    of another print do and scratches do not. Where few are marked, a third of the share of these
+    counts. All are 0 where light is uneven.
     `growth`, shape (k,), is that of ink in dot radii, and `overhang` by how many angles this makes
     arcs longer at either end.
     """
@@ -60,19 +61,18 @@ def unlike_print(
     even = uneven.sum(axis=(1, 2)) < _UNEVEN * ground.sum(axis=(1, 2))
     of_dot = step[..., (radii < _INMOST).all(axis=0)].mean(axis=(1, 2))
     even &= np.abs(of_dot - 1) < _EVEN
-    lost, stray = (
-        np.count_nonzero(of, axis=2) >= _READINGS
-        for of in (ink & (step < _UNLIKE), paper & (step > _EVEN))
-    )
+    lost = np.count_nonzero(ink & (step < _UNLIKE), axis=2) >= _READINGS
     printed = np.maximum(np.count_nonzero(ink.any(axis=2), axis=1), 1)
     of_marks = np.count_nonzero(lost, axis=1) / printed
+    odd = (ink & (step < _UNLIKE)) | (paper & (step > _EVEN))
+    odd[..., 1:] &= odd[..., :-1]  # noise is of one reading
+    told = inked | unmarked
     places = (phases[:, None] + np.arange(count)) % count
     sectors = number, family.bits, count // family.bits
-    differ, told = (
-        np.take_along_axis(of, places, axis=1).reshape(sectors).sum(axis=2)
-        for of in (lost | stray, inked | unmarked)
-    )
-    of_sectors = np.minimum(differ, told) / np.maximum(told, 1)
+    differ = np.take_along_axis(odd & told[..., None], places[..., None], axis=1)
+    of_told = np.take_along_axis(told, places, axis=1).reshape(sectors).sum(axis=2)
+    at_radius = differ.reshape(*sectors, -1).sum(axis=2) / np.maximum(of_told, 1)[..., None]
+    of_sectors = at_radius.max(axis=2)
     unlike = np.maximum(of_sectors.mean(axis=1), _OF_MARKS * of_marks)
     return np.where(even, unlike, 0.0)
 

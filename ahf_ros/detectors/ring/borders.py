@@ -26,14 +26,11 @@ _UNSEEN = 2.3  # price of an end that is not seen, as of one that is anywhere
 _RARE = 12.0  # log odds of a cover against a word that no family has
 
 
-def with_ends(
-    polar: PolarImages, words: Words, overhang: np.ndarray, lit: np.ndarray, family: Family
-) -> Words:
+def with_ends(polar: PolarImages, words: Words, overhang: np.ndarray, family: Family) -> Words:
     """Return words with the evidence of where their arcs end, and the margin that this leaves.
 
-    `overhang`, shape (k,), is by how many angles ink is longer at either end than its sectors;
-    `lit`, shape (k,), the probability of edges of light, which move ends and hide them. A word
-    that no family has competes with words that need a cover.
+    `overhang`, shape (k,), is by how many angles ink is longer at either end than its sectors. A
+    word that no family has competes with words that need a cover.
     """
     inner, outer = family.band
     radii = inner + (outer - inner) * np.tile(DEPTHS, (len(overhang), 1)).T
@@ -42,12 +39,7 @@ def with_ends(
     other, unseen_of_other = _ends(polar, levels, words.as_they_look(), overhang, family)
     ahead = words.ahead + other - odds - _UNSEEN * (unseen_of_other - unseen)
     margin = np.where(words.other == words.words, np.inf, _RARE - ahead)
-    return replace(
-        words,
-        margin=np.minimum(words.margin, margin),
-        coded=words.coded + odds,
-        ends=np.where(odds < 0, odds * (1 - 2 * lit), odds),
-    )
+    return replace(words, margin=np.minimum(words.margin, margin), coded=words.coded + odds)
 
 
 def _ends(

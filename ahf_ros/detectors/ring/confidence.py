@@ -27,42 +27,33 @@ WEIGHTS = Path(__file__).with_name('fitted_weights.json')
 """The data file, which says what made it."""
 
 _OF_TARGET = np.concatenate(read_weights(WEIGHTS, 'confidence', 'intercept', 'weights'))
-_LITTLE = 0.05  # share of the evidence of sharp edges that counts as none
+_LITTLE = 3.0  # log odds of a typical target, of which no share is asked for
+_NONE = 0.05  # share of the evidence of a typical target that counts as none
+_BARE = 30.0  # log odds against bare paper that leave a doubt
 _OF_MARGIN = np.array([-1.0, 1.0])  # one or two log odds leave a doubt
 
 
 def features(read: Hypotheses) -> np.ndarray:
-    """Return what speaks for readings, float64, shape (k, 7).
+    """Return what speaks for readings, float64, shape (k, 6).
 
     Logarithm of the log odds of words against the next ID; root of the log odds of arcs of ink of
-    any length, which are no word by chance, against them, negative; square of the share of the
-    expected edges that are not in their place, negative; logarithm of the share of the evidence
-    of sharp edges that is seen; the log odds that arcs end where sectors do, where these are
-    negative; how easily spots of light show the word, negative; the share of sectors that look
-    like another print, beyond what covers explain, negative.
+    any length against them, negative; logarithm of the share that is seen of the evidence of a
+    typical target of this size in this light; how easily bare paper shows the word, negative; how
+    easily spots of light show it, negative; the share of sectors that look like another print,
+    beyond what covers explain, negative.
     """
-    seen = np.maximum(read.seen, 0) / np.maximum(read.sharp, _LITTLE)
+    seen = np.maximum(read.seen, 0) / np.maximum(read.typical, _LITTLE)
     return np.stack(
         [
             np.log1p(np.maximum(read.margin, 0)),
-            -np.sqrt(np.maximum(-read.coded - _rarity(read), 0)),
-            -((1 - read.share) ** 2),
-            np.log(np.clip(seen, _LITTLE, 1)),
-            np.minimum(read.ends, 0),
+            -np.sqrt(np.maximum(-read.coded, 0)),
+            np.log(np.clip(seen, _NONE, 1)),
+            -np.exp(-np.maximum(read.marked, 0) / _BARE),
             -np.exp(1 - _spots(read)),
             np.minimum(COVERED - read.unlike, 0),
         ],
         axis=1,
     )
-
-
-def _rarity(read: Hypotheses) -> np.ndarray:
-    """Return the log odds that sectors marked at random are no word of a family, shape (k,)."""
-    rarity = {
-        code: code.bits * np.log(2) - np.log(len(code.words) * code.bits)
-        for code in dict.fromkeys(read.families)
-    }
-    return np.array([max(rarity[code], 0.0) for code in read.families])
 
 
 def _spots(read: Hypotheses) -> np.ndarray:
@@ -87,5 +78,5 @@ def confidence(values: np.ndarray) -> np.ndarray:
 
 
 def target_probability(values: np.ndarray) -> np.ndarray:
-    """Return the probabilities that readings are of targets, shape (k,), values (k, 7)."""
+    """Return the probabilities that readings are of targets, shape (k,), values (k, 6)."""
     return logistic(values, _OF_TARGET)

@@ -55,17 +55,16 @@ class Words(ArrayRecord):
     marked : ndarray of float64, shape (k,)
         Log odds of the word against bare paper, and against anything.
     coded : ndarray of float64, shape (k,)
-        Log odds of the word against arcs of ink of any length, whose ends have no price.
-    ends : ndarray of float64, shape (k,)
-        Log odds that these end where sectors do, against anywhere; see `borders`.
+        Log odds of the word against arcs of ink of any length, and covers of any length; with
+        where they end, see `borders`.
     other : ndarray of int64, shape (k,)
         The sectors as they look, in the same rotation, whether or not a family has that word.
     ahead : ndarray of float64, shape (k,)
         Log odds of these against the word and what covers it.
     seen : ndarray of float64, shape (k,)
         Log odds of the word, where it is not covered, against anything.
-    sharp : ndarray of float64, shape (k,)
-        The same, if all marks and all paper looked as they should.
+    typical : ndarray of float64, shape (k,)
+        The same as targets with this word have it on average, in light with as many edges.
     unlike : ndarray of float64, shape (k,)
         Share of sectors in which targets are not what their words print, see `appearance`.
     hidden : ndarray of bool, shape (k, m)
@@ -77,11 +76,10 @@ class Words(ArrayRecord):
     margin: np.ndarray
     marked: np.ndarray
     coded: np.ndarray
-    ends: np.ndarray
     other: np.ndarray
     ahead: np.ndarray
     seen: np.ndarray
-    sharp: np.ndarray
+    typical: np.ndarray
     unlike: np.ndarray
     hidden: np.ndarray
 
@@ -98,11 +96,10 @@ class Words(ArrayRecord):
             margin=np.zeros(count),
             marked=np.zeros(count),
             coded=np.zeros(count),
-            ends=np.zeros(count),
             other=np.zeros(count, np.int64),
             ahead=np.zeros(count),
             seen=np.zeros(count),
-            sharp=np.zeros(count),
+            typical=np.zeros(count),
             unlike=np.zeros(count),
             hidden=np.zeros((count, angles), bool),
         )
@@ -166,6 +163,13 @@ def decode(
     np.put_along_axis(hidden, order, turned_hidden, axis=1)
     hidden |= (some.paper == 0) & (some.ink == 0)
     score = scores[rows, best].astype(np.float64)
+    arcs, of_arcs = _free_paths(turned)
+    of_best = steps[rows, best]
+    of_best_word = 2 * of_best > last, (of_best > 0) & (of_best < last)
+    # Covers may be as long as they like, as arcs of any length may.
+    one = (of[..., None] for of in of_word)
+    of_any_length = _covered_paths(*one, turned, _COVERED)[:, 0].astype(np.float64)
+    borders = _of_borders(*of_best_word, hidden, of_arcs, _border(turned), family)
     bare = np.maximum(turned.paper.sum(axis=1), 0)
     at_phase = phases[rows, best] % per_sector
     looks, _ = likeliest_bits(ones[read, at_phase], pairs[read, at_phase])
@@ -174,20 +178,16 @@ def decode(
     looks = np.take_along_axis(looks, (turn[:, None] + np.arange(family.bits)) % family.bits, 1)
     other = looks @ (1 << np.arange(family.bits))
     *_, of_other = explained(other[:, None], phases[rows, best][:, None])
-    arcs, of_arcs = _free_paths(turned)
-    of_best = steps[rows, best]
-    of_best_word = 2 * of_best > last, (of_best > 0) & (of_best < last)
     found = Words(
         words=words[rows, best],
         starts=2 * np.pi * phases[rows, best] / angles,
         margin=margin.astype(np.float64),
         marked=score - bare + some.dot,
-        coded=score - arcs - _of_borders(*of_best_word, hidden, of_arcs, _border(turned), family),
-        ends=np.zeros(len(read)),
+        coded=of_any_length - arcs - borders,
         other=other,
         ahead=of_other[:, 0] - score,
         seen=score,
-        sharp=_if_sharp(some, of_best_word[0], hidden),
+        typical=_typical(some, of_best_word[0], hidden),
         unlike=np.zeros(len(read)),
         hidden=hidden,
     )
@@ -204,15 +204,15 @@ def without_outliers(evidence: Evidence) -> Evidence:
         for of in (evidence.paper, evidence.ink, evidence.between)
     )
     between = _unsure(np.concatenate([paper[:, None], between, ink[:, None]], axis=1), evidence)
-    sharp = _bounded(evidence.sharp.sum(axis=1), evidence)
-    return replace(evidence, paper=paper, ink=ink, between=between, sharp=sharp)
+    typical = _bounded(evidence.typical.sum(axis=1), evidence)
+    return replace(evidence, paper=paper, ink=ink, between=between, typical=typical)
 
 
-def _if_sharp(evidence: Evidence, inked: np.ndarray, hidden: np.ndarray) -> np.ndarray:
-    """Return what words would have that look as they should, from ink and covers (k, m), (k,)."""
-    if not evidence.sharp.shape[1]:
+def _typical(evidence: Evidence, inked: np.ndarray, hidden: np.ndarray) -> np.ndarray:
+    """Return the evidence that words have on average, from ink and covers (k, m), (k,)."""
+    if not evidence.typical.shape[1]:
         return np.zeros(len(inked))
-    paper, ink = evidence.sharp.transpose(1, 0, 2)
+    paper, ink = evidence.typical.transpose(1, 0, 2)
     of_angles = np.where(hidden, 0, np.where(inked, ink, paper))
     return np.asarray(of_angles.sum(axis=1, dtype=np.float64))
 
@@ -249,13 +249,13 @@ def _half_paper(evidence: Evidence) -> np.ndarray:
     return _bounded(half, evidence)
 
 
-def _like_paper(of: Evidence) -> tuple[np.ndarray, np.ndarray]:
+def _like_paper(of: Evidence, further: float = _MORE) -> tuple[np.ndarray, np.ndarray]:
     """Return the prices of something that looks like paper, of its first reading and of more.
 
     Where light has many edges, it explains what looks like paper on a mark. float32, shape (k,).
     """
     light = 1 + np.float32(_IN_LIGHT) * (of.lit - SURPRISES[0])
-    return np.float32(_LIKE_PAPER) * light, np.float32(_MORE) * of.weight * light
+    return np.float32(_LIKE_PAPER) * light, np.float32(further) * of.weight * light
 
 
 def _of_sectors(
@@ -357,13 +357,16 @@ def _along_words(evidence: Evidence, steps: np.ndarray) -> np.ndarray:
     return np.take(np.ascontiguousarray(every), first + steps.transpose(2, 0, 1))
 
 
-def _covered_paths(seen: np.ndarray, as_paper: np.ndarray, of: Evidence) -> np.ndarray:
+def _covered_paths(
+    seen: np.ndarray, as_paper: np.ndarray, of: Evidence, further: float = _MORE
+) -> np.ndarray:
     """Return the evidence for words with their best covers, (k, w).
 
-    From the evidence where they are seen, and where something like paper covers them, (m, k, w).
+    From the evidence where they are seen, and where something like paper covers them, (m, k, w);
+    `further` is the price of each of its readings but the first.
     """
     cost = np.float32(_COVERED) * of.weight[:, None]
-    price, more = (of_cover[:, None] for of_cover in _like_paper(of))
+    price, more = (of_cover[:, None] for of_cover in _like_paper(of, further))
     clear = seen[0]
     covered, like_paper = (np.full_like(clear, _NEVER) for _ in range(2))
     for of_angle, of_paper in zip(seen[1:], as_paper[1:], strict=True):

@@ -42,7 +42,7 @@ class Hypotheses(ArrayRecord):
         In the rotation read; 0 where there is none.
     starts : ndarray of float64, shape (k,)
         Where in the frame the sector of the lowest bit starts, rad counter-clockwise from +x.
-    margin, marked, coded, ends, seen, sharp, unlike : ndarray of float64, shape (k,)
+    margin, marked, coded, seen, typical, unlike : ndarray of float64, shape (k,)
         Log odds of the word and looks of its print, see `ahf_ros.detectors.ring.decoding.Words`.
     hidden : ndarray of float64, shape (k,)
         Share of the band that something covers.
@@ -64,9 +64,8 @@ class Hypotheses(ArrayRecord):
     margin: np.ndarray
     marked: np.ndarray
     coded: np.ndarray
-    ends: np.ndarray
     seen: np.ndarray
-    sharp: np.ndarray
+    typical: np.ndarray
     unlike: np.ndarray
     hidden: np.ndarray
     families: np.ndarray
@@ -117,9 +116,8 @@ class Hypotheses(ArrayRecord):
             margin=words.margin,
             marked=words.marked,
             coded=words.coded,
-            ends=words.ends,
             seen=words.seen,
-            sharp=words.sharp,
+            typical=words.typical,
             unlike=words.unlike,
             hidden=words.hidden.mean(axis=1),
             families=np.full(len(words.words), family, object),

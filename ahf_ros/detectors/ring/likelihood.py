@@ -69,9 +69,9 @@ class Evidence(ArrayRecord):
         Where the band is unmarked, and where it is marked.
     between : ndarray of float32, shape (k, 2, s, m)
         Where blur mixes both, for shares of ink in equal steps from paper to ink; s may be 0.
-    sharp : ndarray of float32, shape (k, 2, 2, m)
-        What edges of paper and of ink would give where these look as they should; only where
-        shares of ink are asked for.
+    typical : ndarray of float32, shape (k, 2, 2, m)
+        What edges of paper and of ink give on average where these look as they should, as far as
+        edges of light let them; only where shares of ink are asked for.
     weight : ndarray of float32, shape (k,)
         Of a reading, which is part of all; less than 1 where neighbours tell the same.
     dot : ndarray of float32, shape (k,)
@@ -87,7 +87,7 @@ class Evidence(ArrayRecord):
     paper: np.ndarray
     ink: np.ndarray
     between: np.ndarray
-    sharp: np.ndarray
+    typical: np.ndarray
     weight: np.ndarray
     dot: np.ndarray
     lit: np.ndarray
@@ -108,7 +108,7 @@ class Evidence(ArrayRecord):
             ink=np.where(self.covered, 0, self.ink) + np.where(across, 0, levels.ink),
             between=np.where(self.covered[:, :, None], 0, self.between)
             + np.where(across[:, :, None], 0, levels.between),
-            sharp=self.sharp,
+            typical=self.typical,
             weight=self.weight,
             dot=self.dot + levels.dot,
             lit=np.maximum(self.lit, levels.lit),
@@ -171,7 +171,7 @@ def edge_evidence(
     ]
     lit_ground = np.maximum(ground, polar.paper(ground, marked[0]))
     paper, ink, *between = _step_evidence(polar, inside, ground, edges, bare, marked, shares)
-    between, sharp = between[: len(shares)], between[len(shares) :]
+    between, typical = between[: len(shares)], between[len(shares) :]
     weight = weights(polar)
     visible = polar.reach[:, None] >= np.stack([inner + within, outer + beside], axis=1)[..., None]
     share = weight[:, None, None] * visible
@@ -179,7 +179,7 @@ def edge_evidence(
         paper=paper * share,
         ink=ink * share,
         between=_stacked(between, ink) * share[:, :, None],
-        sharp=_stacked(sharp, ink) * share[:, :, None],
+        typical=_stacked(typical, ink) * share[:, :, None],
         weight=weight,
         dot=np.zeros_like(weight),
         lit=edges.astype(np.float32),
@@ -259,7 +259,8 @@ def _step_evidence(
 
     The shares of ink that blur leaves on ground and band, shape (k, 2, 1) each, are those of bare
     bands and of marked ones. Glare makes the step of a mark smaller. Where it makes ground white,
-    paper between is white. Then comes that for shares of marks.
+    paper between is white. Then comes that for shares of marks, and what paper and ink give on
+    average: where they look as they should, and where an edge of light lies between.
     """
     (level, noise), (beside, of_ground) = polar.logs(band), polar.logs(ground)
     blank, ink = (
@@ -296,15 +297,15 @@ def _step_evidence(
         zero = np.zeros_like(spread)
         densities += [normal(zero, spread), normal(zero, (low + high) / 2)]
         plain += [normal(zero, spread), normal(mark, spread)]
-    clear = polar.tells(band)
-    return [
-        np.where(
-            clear,
-            np.log(((1 - lit) * density + lit * _ANY) / (_PLAIN * of + (1 - _PLAIN) * _ANY)),
-            0,
-        )
+    odds = [
+        np.log(((1 - lit) * density + lit * _ANY) / (_PLAIN * of + (1 - _PLAIN) * _ANY))
         for density, of in zip(densities, plain, strict=True)
     ]
+    if shares:
+        at_edge = lit * np.log(lit / (1 - _PLAIN))
+        odds[-2:] = [(1 - lit) * of + at_edge for of in odds[-2:]]
+    clear = polar.tells(band)
+    return [np.where(clear, of, 0) for of in odds]
 
 
 def _gain(paper: np.ndarray, ink: np.ndarray) -> np.ndarray:
@@ -378,7 +379,7 @@ def level_evidence(
         paper=of_halves[0],
         ink=of_halves[1],
         between=np.moveaxis(of_halves[2:], 0, 2),
-        sharp=_stacked([], of_halves[1]),
+        typical=_stacked([], of_halves[1]),
         weight=weight,
         dot=(ink - paper)[..., in_dot].sum(axis=(1, 2)),
         lit=surprise[:, 0, 0].astype(np.float32),

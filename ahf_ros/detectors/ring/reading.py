@@ -95,7 +95,7 @@ def _read_part(gray: np.ndarray, dots: Fit, family: Family, prior: Prior) -> Hyp
     overhang = _overhang(growth, family)
     words = decode(edges, overhang, family, prior.expected)
     words = _settled(gray, fit, polar, edges, words, growth, family, prior.expected)
-    words = with_ends(polar, words, overhang, edges.lit, family)
+    words = with_ends(polar, words, overhang, family)
     words = replace(words, unlike=unlike_print(polar, words, growth, overhang, family))
     good = _mean_odds(words, edges.weight) > hopeful
     if not good.any():
@@ -166,7 +166,7 @@ def _settled(
     hidden = of_all.hidden | (polar.reach < of_band[0])
     # What speaks against no target is that of edges, so that all targets compare.
     of_edges = words.select(some)
-    of_all = replace(of_all, seen=of_edges.seen, sharp=of_edges.sharp, hidden=hidden)
+    of_all = replace(of_all, seen=of_edges.seen, typical=of_edges.typical, hidden=hidden)
     return words.replaced(some, of_all)
 
 
