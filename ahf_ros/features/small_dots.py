@@ -152,24 +152,26 @@ def _connected(
     none = np.zeros(0, np.int32)
     found: list[tuple[np.ndarray, ...]] = [(none, none, none)]
     for top, left, part, own in _parts(height, least):
-        level = cv2.convertScaleAbs(
-            np.maximum(cv2.dilate(part, _NEAR), np.uint8(least)), alpha=share
-        )
-        mask = cv2.compare(part, level, cv2.CMP_GT)
+        level = cv2.dilate(part, _NEAR)
+        cv2.max(level, int(least), level)  # in place, as new memory takes longer
+        mask = part > cv2.convertScaleAbs(level, level, alpha=share)
         if own is not None:
-            mask = cv2.bitwise_and(mask, own)
+            mask &= own
         if not mask.any():
             continue
         # The default algorithm of OpenCV 4.5 crashes on large images with this connectivity.
-        count, labels = cv2.connectedComponentsWithAlgorithm(mask, 4, cv2.CV_32S, cv2.CCL_SAUF)
-        x, y = cv2.findNonZero(mask).reshape(-1, 2).T
-        label = labels[y, x]
+        count, labels = cv2.connectedComponentsWithAlgorithm(
+            mask.view(np.uint8), 4, cv2.CV_32S, cv2.CCL_SAUF
+        )
+        places = np.flatnonzero(mask)
+        label = labels.ravel().take(places)
         area = np.bincount(label, minlength=count)
         # A blob of more pixels is longer. How long the others are is measured on what is left.
         usable = (area >= _MINIMUM_PIXELS) & (area <= longest**2)
         of_usable = np.flatnonzero(usable.take(label))
         order = of_usable[np.argsort(label[of_usable], kind='stable')]
-        found.append((x[order] + left, y[order] + top, area[usable]))
+        y, x = np.divmod(places[order], mask.shape[1])
+        found.append((x + left, y + top, area[usable]))
     x, y, size = (np.concatenate(column) for column in zip(*found, strict=True))
     return x, y, size
 
@@ -195,11 +197,11 @@ def _parts(
     for number in range(1, count):
         column, row, columns, rows, _ = stats[number].tolist()
         own = labels[row : row + rows, column : column + columns] == number
-        own = np.kron(own.astype(np.uint8), np.full((_TILE, _TILE), 255, np.uint8))
+        own = np.kron(own, np.ones((_TILE, _TILE), bool))
         own = np.pad(own, _REACH)
         top, left = row * _TILE - _REACH, column * _TILE - _REACH
         bottom, right = top + own.shape[0], left + own.shape[1]
         own = own[max(-top, 0) :, max(-left, 0) :]
         top, left = max(top, 0), max(left, 0)
         part = height[top:bottom, left:right]
-        yield top, left, part, np.ascontiguousarray(own[: part.shape[0], : part.shape[1]])
+        yield top, left, part, own[: part.shape[0], : part.shape[1]]
