@@ -113,11 +113,14 @@ def decode(
     overhang: np.ndarray,
     family: Family,
     expected: frozenset[int] = frozenset(),
+    *,
+    looks: bool = True,
 ) -> Words:
     """Return the words with the most evidence, of k bands at m angles in the order of sectors.
 
     `overhang`, shape (k,), is by how many angles ink is longer at either end than its sectors;
-    `expected` are IDs that are likely to be there. Empty: all IDs are equally likely.
+    `expected` are IDs that are likely to be there. Empty: all IDs are equally likely. Without
+    `looks`, words stand for the sectors as they look as well.
     """
     of_bands = without_outliers(evidence)
     count, angles = of_bands.paper.shape
@@ -140,9 +143,11 @@ def decode(
         ink=np.take_along_axis(some.ink, order, 1),
         between=np.take_along_axis(some.between, order[:, None], 2),
     )
+    _, more = _like_paper(some)
     like_paper = np.take_along_axis(
         np.maximum(some.paper, _half_paper(evidence.select(read))), order, axis=1
     )
+    under_paper, on_mark = turned.paper - more[:, None], like_paper - more[:, None]
     last = some.between.shape[1] + 1
 
     def explained(words: np.ndarray, phases: np.ndarray) -> tuple[np.ndarray, ...]:
@@ -151,7 +156,7 @@ def decode(
         shown = np.take_along_axis(steps, order[:, None], axis=2)
         seen = _along_words(turned, shown)
         marked = (2 * shown > last).transpose(2, 0, 1)
-        as_paper = np.where(marked, like_paper.T[..., None], turned.paper.T[..., None])
+        as_paper = np.where(marked, on_mark.T[..., None], under_paper.T[..., None])
         return steps, seen, as_paper, _covered_paths(seen, as_paper, turned)
 
     steps, evidence_of, as_paper, scores = explained(words, phases)
@@ -167,27 +172,29 @@ def decode(
     hidden |= (some.paper == 0) & (some.ink == 0)
     score = scores[rows, best].astype(np.float64)
     bare = np.maximum(turned.paper.sum(axis=1), 0)
-    at_phase = phases[rows, best] % per_sector
-    looks, _ = likeliest_bits(ones[read, at_phase], pairs[read, at_phase])
-    # The phases of words begin at any of the sectors.
-    turn = phases[rows, best] // per_sector
-    looks = np.take_along_axis(looks, (turn[:, None] + np.arange(family.bits)) % family.bits, 1)
-    other = looks @ (1 << np.arange(family.bits))
-    *_, of_other = explained(other[:, None], phases[rows, best][:, None])
+    of_best, phase = words[rows, best], phases[rows, best]
+    other, of_other = of_best, score
+    if looks:
+        bits, _ = likeliest_bits(*(of[read, phase % per_sector] for of in (ones, pairs)))
+        # The phases of words begin at any of the sectors.
+        turn = phase[:, None] // per_sector + np.arange(family.bits)
+        other = np.take_along_axis(bits, turn % family.bits, 1) @ (1 << np.arange(family.bits))
+    if (other != of_best).any():
+        of_other = explained(other[:, None], phase[:, None])[-1][:, 0]
     arcs, of_arcs = _free_paths(turned)
-    of_best = steps[rows, best]
-    of_best_word = 2 * of_best > last, (of_best > 0) & (of_best < last)
+    shown = steps[rows, best]
+    inked, mixed = 2 * shown > last, (shown > 0) & (shown < last)
     found = Words(
-        words=words[rows, best],
-        starts=2 * np.pi * phases[rows, best] / angles,
+        words=of_best,
+        starts=2 * np.pi * phase / angles,
         margin=margin.astype(np.float64),
         marked=score - bare + some.dot,
-        coded=score - arcs - _of_borders(*of_best_word, hidden, of_arcs, _border(turned), family),
+        coded=score - arcs - _of_borders(inked, mixed, hidden, of_arcs, _border(turned), family),
         ends=np.zeros(len(read)),
         other=other,
-        ahead=of_other[:, 0] - score,
+        ahead=of_other - score,
         seen=score,
-        sharp=_if_sharp(some, of_best_word[0], hidden),
+        sharp=_if_sharp(some, inked, hidden),
         unlike=np.zeros(len(read)),
         hidden=hidden,
     )
@@ -360,18 +367,22 @@ def _along_words(evidence: Evidence, steps: np.ndarray) -> np.ndarray:
 def _covered_paths(seen: np.ndarray, as_paper: np.ndarray, of: Evidence) -> np.ndarray:
     """Return the evidence for words with their best covers, (k, w).
 
-    From the evidence where they are seen, and where something like paper covers them, (m, k, w).
+    From the evidence where they are seen, and where something like paper covers them, less its
+    price, (m, k, w).
     """
+    price = np.stack([np.full_like(of.weight, COVER), _like_paper(of)[0]])[..., None]
     cost = np.float32(_COVERED) * of.weight[:, None]
-    price, more = (of_cover[:, None] for of_cover in _like_paper(of))
-    clear = seen[0]
-    covered, like_paper = (np.full_like(clear, _NEVER) for _ in range(2))
+    clear = seen[0].copy()
+    hidden = np.full((2, *clear.shape), _NEVER)
+    (covered, like_paper), begun = hidden, np.empty_like(hidden)
     for of_angle, of_paper in zip(seen[1:], as_paper[1:], strict=True):
-        before = clear
-        clear = np.maximum(np.maximum(clear, covered), like_paper) + of_angle
-        covered = np.maximum(covered, before - np.float32(COVER)) - cost
-        like_paper = np.maximum(like_paper, before - price)
-        like_paper += of_paper - more
+        np.subtract(clear, price, out=begun)
+        np.maximum(clear, covered, out=clear)
+        np.maximum(clear, like_paper, out=clear)
+        clear += of_angle
+        np.maximum(hidden, begun, out=hidden)
+        covered -= cost
+        like_paper += of_paper
     return np.maximum(np.maximum(clear, covered), like_paper)
 
 
@@ -398,8 +409,8 @@ def _backtracked(seen: np.ndarray, as_paper: np.ndarray, of: Evidence) -> np.nda
     """
     count, bands = seen.shape
     cost = np.broadcast_to(np.float32(_COVERED) * of.weight, seen.shape)
-    price, more = _like_paper(of)
-    gains = np.stack([seen, -cost, as_paper - more], axis=1)
+    price, _ = _like_paper(of)
+    gains = np.stack([seen, -cost, as_paper], axis=1)
     until, after = np.full((2, count, 3, bands), _NEVER)
     until[0, 0], after[-1] = seen[0], 0
     cover = np.float32(COVER)
@@ -473,18 +484,34 @@ def _free_paths(evidence: Evidence) -> tuple[np.ndarray, np.ndarray]:
     looks = np.stack([evidence.paper, evidence.ink]).transpose(2, 0, 1)
     between = evidence.between.max(axis=1, initial=0).T
     mixed = np.maximum(np.maximum(looks[:, 0], looks[:, 1]), between) - _border(evidence)
-    seen, covered = looks[0], np.full_like(cost, _NEVER)  # of paths that end on paper or ink
-    borders, of_covered = np.zeros(seen.shape, np.intp), np.zeros(cost.shape, np.intp)
-    for here, border in zip(looks[1:], mixed[1:], strict=True):
+    paths = np.full((len(looks), 3, len(cost)), _NEVER)  # that end on paper, on ink or covered
+    paths[0, :2] = looks[0]
+    band, covers = paths[:, :2], paths[:, 2]
+    seen, covered = band[0], covers[0]
+    for here, border, of_seen, of_covered in zip(
+        looks[1:], mixed[1:], band[1:], covers[1:], strict=True
+    ):
         begun = np.maximum(seen[0], seen[1]) - cover
-        of_begun = borders[0] + (seen[1] > seen[0]) * (borders[1] - borders[0])
-        turned, of_turned = seen[::-1] + border, borders[::-1] + 1
         stayed = np.maximum(seen, covered) + here
-        of_stayed = borders + (covered > seen) * (of_covered - borders)
-        borders = of_stayed + (turned > stayed) * (of_turned - of_stayed)
-        seen = np.maximum(stayed, turned)
-        of_covered = of_covered + (begun > covered) * (of_begun - of_covered)
-        covered = np.maximum(covered, begun) - cost
-    ends = np.concatenate([seen, covered[None]])
-    best, of_ends = ends.argmax(axis=0), np.concatenate([borders, of_covered[None]])
-    return ends.max(axis=0), of_ends[best, np.arange(len(best))]
+        np.maximum(stayed, seen[::-1] + border, out=of_seen)
+        np.subtract(np.maximum(covered, begun), cost, out=of_covered)
+        seen, covered = of_seen, of_covered
+    # Where the paths come from is compared as above, for all angles at once.
+    seen, covered = band[:-1], covers[:-1, None]
+    paper, ink = seen.swapaxes(0, 1)
+    stayed = np.maximum(seen, covered) + looks[1:]
+    origin = np.empty((len(looks) - 1, 3, len(cost)), np.intp)
+    origin[:, :2] = np.where(covered > seen, 2, [[0], [1]])
+    turned = np.zeros(origin.shape, bool)
+    turned[:, :2] = seen[:, ::-1] + mixed[1:, None] > stayed
+    np.copyto(origin[:, :2], [[1], [0]], where=turned[:, :2])
+    origin[:, 2] = np.where(np.maximum(paper, ink) - cover > covers[:-1], ink > paper, 2)
+    origin *= len(cost)
+    origin += np.arange(len(cost))
+    place, places = paths[-1].argmax(axis=0) * len(cost) + np.arange(len(cost)), []
+    for of_angle in origin.reshape(len(origin), -1)[::-1]:
+        places.append(place)
+        place = of_angle[place]
+    ends = turned.reshape(len(origin), -1)[::-1]
+    borders = np.take_along_axis(ends, np.reshape(places, (len(ends), -1)), axis=1).sum(axis=0)
+    return paths[-1].max(axis=0), borders

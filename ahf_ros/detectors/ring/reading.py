@@ -71,7 +71,7 @@ def _read_part(gray: np.ndarray, dots: Fit, family: Family, prior: Prior) -> Hyp
     polar = polar_images(gray, dots, family.band, family.bits * PER_SECTOR)
     growth = best_growth(polar, family.band, prior)
     edges = edge_evidence(polar, 1 - growth, growth, family.band, SHARES)
-    words = decode(edges, _overhang(growth, family), family, prior.expected)
+    words = decode(edges, _overhang(growth, family), family, prior.expected, looks=False)
     read = np.flatnonzero(_mean_odds(words, edges.weight) > hopeful)
     if not read.size:
         return unread
@@ -81,7 +81,7 @@ def _read_part(gray: np.ndarray, dots: Fit, family: Family, prior: Prior) -> Hyp
     # In the frame of the printed dot, the same growth is a larger share.
     some = polar.select(read), edges, words.select(read)
     growth = growth / (1 - growth)
-    words = _settled(gray, printed, *some, growth, family, prior.expected)
+    words = _settled(gray, printed, *some, growth, family, prior.expected, looks=False)
     good = _mean_odds(words, edges.weight) > hopeful
     if not good.any():
         return unread
@@ -94,7 +94,7 @@ def _read_part(gray: np.ndarray, dots: Fit, family: Family, prior: Prior) -> Hyp
     edges = edge_evidence(polar, np.ones(len(read)), growth, family.band, SHARES)
     overhang = _overhang(growth, family)
     words = decode(edges, overhang, family, prior.expected)
-    words = _settled(gray, fit, polar, edges, words, growth, family, prior.expected)
+    words = _settled(gray, fit, polar, edges, words, growth, family, prior.expected, looks=True)
     words = with_ends(polar, words, overhang, edges.lit, family)
     words = replace(words, unlike=unlike_print(polar, words, growth, overhang, family))
     good = _mean_odds(words, edges.weight) > hopeful
@@ -141,10 +141,13 @@ def _settled(
     growth: np.ndarray,
     family: Family,
     expected: frozenset[int],
+    *,
+    looks: bool,
 ) -> Words:
     """Return the words of targets, by all evidence where edges alone leave a doubt.
 
     Targets are in the frames of their printed dots, the unit of the growth of their colour, (k,).
+    For `looks` see `decode`.
     """
     some = np.flatnonzero(_doubtful(words, edges))
     if not some.size:
@@ -162,7 +165,7 @@ def _settled(
     growth = growth[some]
     of_levels = level_evidence(polar, levels, *light, radii, growth, family.band, SHARES)
     evidence = edges.plus(of_levels)
-    of_all = decode(evidence, _overhang(growth, family), family, expected)
+    of_all = decode(evidence, _overhang(growth, family), family, expected, looks=looks)
     hidden = of_all.hidden | (polar.reach < of_band[0])
     # What speaks against no target is that of edges, so that all targets compare.
     of_edges = words.select(some)
