@@ -53,17 +53,28 @@ _SHIFTS = np.arange(-2.4, 2.41, 0.4)  # of edges, that are tried, px
 
 
 def read_bands(
-    gray: np.ndarray, dots: Fit, family: Family, prior: Prior = NOTHING_KNOWN
+    gray: np.ndarray,
+    dots: Fit,
+    family: Family,
+    prior: Prior = NOTHING_KNOWN,
+    least: np.ndarray | None = None,
 ) -> Hypotheses:
-    """Read the bands about dots, and refine dot and band together: one hypothesis of each dot."""
-    parts = [
-        _read_part(gray, dots.select(slice(start, start + PART)), family, prior)
-        for start in range(0, max(len(dots.frames), 1), PART)
-    ]
-    return Hypotheses.joined(parts)
+    """Read the bands about dots, and refine dot and band together: one hypothesis of each dot.
+
+    Words whose log odds against anything, see `Words.seen`, are not above `least`, shape (k,), are
+    not asked for: their dots may be left unread.
+    """
+    least = np.full(len(dots.frames), -np.inf) if least is None else least
+    starts = range(0, max(len(dots.frames), 1), PART)
+    parts = [slice(start, start + PART) for start in starts]
+    return Hypotheses.joined(
+        [_read_part(gray, dots.select(part), family, prior, least[part]) for part in parts]
+    )
 
 
-def _read_part(gray: np.ndarray, dots: Fit, family: Family, prior: Prior) -> Hypotheses:
+def _read_part(
+    gray: np.ndarray, dots: Fit, family: Family, prior: Prior, least: np.ndarray
+) -> Hypotheses:
     unread = Hypotheses.unread(dots, family)
     if not len(dots.frames):
         return unread
@@ -92,8 +103,15 @@ def _read_part(gray: np.ndarray, dots: Fit, family: Family, prior: Prior) -> Hyp
     growth = fit.polarity * fit.edge_shift / fit.size
     polar = polar_images(gray, fit, family.band, family.bits * PER_SECTOR)
     edges = edge_evidence(polar, np.ones(len(read)), growth, family.band, SHARES)
+    words = decode(edges, _overhang(growth, family), family, prior.expected)
+    # What is seen against anything is that of edges alone, whatever else there is.
+    some = np.flatnonzero(words.seen > least[read])
+    if not some.size:
+        return unread
+    if some.size < read.size:
+        read, growth = read[some], growth[some]
+        fit, polar, edges, words = (of.select(some) for of in (fit, polar, edges, words))
     overhang = _overhang(growth, family)
-    words = decode(edges, overhang, family, prior.expected)
     words = _settled(gray, fit, polar, edges, words, growth, family, prior.expected, looks=True)
     words = with_ends(polar, words, overhang, edges.lit, family)
     words = replace(words, unlike=unlike_print(polar, words, growth, overhang, family))
