@@ -79,7 +79,7 @@ class Evidence(ArrayRecord):
     lit : ndarray of float32, shape (k,)
         Probability that an edge of light lies between two neighbouring readings.
     covered : ndarray of bool, shape (k, 2, m)
-        Where something covers the ground beside the band.
+        Where something covers the ground beside the band; only where shares of ink are asked for.
     blur : ndarray of float64, shape (k,)
         Of ends of arcs, standard deviation in angles.
     """
@@ -169,12 +169,15 @@ def edge_evidence(
         of_dot + _blurred(polar, at, inner, outer)
         for of_dot, at in zip(bare, (ground_at, band_at), strict=True)
     ]
-    lit_ground = np.maximum(ground, polar.paper(ground, marked[0]))
     paper, ink, *between = _step_evidence(polar, inside, ground, edges, bare, marked, shares)
     between, sharp = between[: len(shares)], between[len(shares) :]
     weight = weights(polar)
     visible = polar.reach[:, None] >= np.stack([inner + within, outer + beside], axis=1)[..., None]
     share = weight[:, None, None] * visible
+    covered = np.zeros(visible.shape, bool)
+    if shares:
+        lit_ground = np.maximum(ground, polar.paper(ground, marked[0]))
+        covered = _covered(polar, inside, lit_ground, ink > paper, visible)
     return Evidence(
         paper=paper * share,
         ink=ink * share,
@@ -183,7 +186,7 @@ def edge_evidence(
         weight=weight,
         dot=np.zeros_like(weight),
         lit=edges.astype(np.float32),
-        covered=_covered(polar, inside, lit_ground, ink > paper, visible),
+        covered=covered,
         blur=_blur_along(polar, band),
     )
 
