@@ -153,7 +153,8 @@ def _connected(
     found: list[tuple[np.ndarray, ...]] = [(none, none, none)]
     for top, left, part, own in _parts(height, least):
         level = cv2.dilate(part, _NEAR)
-        cv2.max(level, int(least), level)  # in place, as new memory takes longer
+        # In place, as new memory takes longer.
+        cv2.max(level, int(least), level)  # type: ignore[call-overload]
         mask = part > cv2.convertScaleAbs(level, level, alpha=share)
         if own is not None:
             mask &= own
@@ -164,7 +165,7 @@ def _connected(
             mask.view(np.uint8), 4, cv2.CV_32S, cv2.CCL_SAUF
         )
         places = np.flatnonzero(mask)
-        label = labels.ravel().take(places)
+        label: np.ndarray = labels.ravel().take(places)
         area = np.bincount(label, minlength=count)
         # A blob of more pixels is longer. How long the others are is measured on what is left.
         usable = (area >= _MINIMUM_PIXELS) & (area <= longest**2)

@@ -105,12 +105,13 @@ def _read_part(
     edges = edge_evidence(polar, np.ones(len(read)), growth, family.band, SHARES)
     words = decode(edges, _overhang(growth, family), family, prior.expected)
     # What is seen against anything is that of edges alone, whatever else there is.
-    some = np.flatnonzero(words.seen > least[read])
-    if not some.size:
+    asked = np.flatnonzero(words.seen > least[read])
+    if not asked.size:
         return unread
-    if some.size < read.size:
-        read, growth = read[some], growth[some]
-        fit, polar, edges, words = (of.select(some) for of in (fit, polar, edges, words))
+    if asked.size < read.size:
+        read, growth = read[asked], growth[asked]
+        fit, polar = fit.select(asked), polar.select(asked)
+        edges, words = edges.select(asked), words.select(asked)
     overhang = _overhang(growth, family)
     words = _settled(gray, fit, polar, edges, words, growth, family, prior.expected, looks=True)
     words = with_ends(polar, words, overhang, edges.lit, family)
