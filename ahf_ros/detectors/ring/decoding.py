@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ahf_ros.codes.ring import Family
+from ahf_ros.codes.ring import Family, canonical
 from ahf_ros.detectors.ring.codewords import best_words, likeliest_bits, margins, prior
 from ahf_ros.detectors.ring.likelihood import SURPRISES, Evidence
 from ahf_ros.features.array_record import ArrayRecord
@@ -152,22 +152,23 @@ def decode(
 
     def explained(words: np.ndarray, phases: np.ndarray) -> tuple[np.ndarray, ...]:
         """Return what words show, the evidence for them along bands, with covers, and in all."""
-        steps = _steps(words, phases, ends, some, family)
-        shown = np.take_along_axis(steps, order[:, None], axis=2)
+        shown = _steps(words, phases - order[:, :1], ends, some, family)
         seen = _along_words(turned, shown)
         marked = (2 * shown > last).transpose(2, 0, 1)
         as_paper = np.where(marked, on_mark.T[..., None], under_paper.T[..., None])
-        return steps, seen, as_paper, _covered_paths(seen, as_paper, turned)
+        return shown, seen, as_paper, _covered_paths(seen, as_paper, turned)
 
     steps, evidence_of, as_paper, scores = explained(words, phases)
+    ids = canonical(words, family)[1]
     likely = scores + prior(words, family, expected)
     rows, best = np.arange(len(read)), likely.argmax(axis=1)
     # What is expected wins a draw, but an ID that is read clearly is no other one.
-    read_as, known_as = (margins(words, of, best, family) for of in (scores, likely))
+    read_as, known_as = (margins(ids, of, best) for of in (scores, likely))
     margin = np.clip(known_as, read_as, read_as + _DRAW)
     of_word = evidence_of[:, rows, best], as_paper[:, rows, best]
     turned_hidden = _hidden(*of_word, scores[rows, best], turned)
-    hidden = np.empty(turned_hidden.shape, bool)
+    shown, hidden = np.empty(order.shape, np.uint8), np.empty(order.shape, bool)
+    np.put_along_axis(shown, order, steps[rows, best], axis=1)
     np.put_along_axis(hidden, order, turned_hidden, axis=1)
     hidden |= (some.paper == 0) & (some.ink == 0)
     score = scores[rows, best].astype(np.float64)
@@ -182,7 +183,6 @@ def decode(
     if (other != of_best).any():
         of_other = explained(other[:, None], phase[:, None])[-1][:, 0]
     arcs, of_arcs = _free_paths(turned)
-    shown = steps[rows, best]
     inked, mixed = 2 * shown > last, (shown > 0) & (shown < last)
     found = Words(
         words=of_best,
@@ -263,6 +263,11 @@ def _like_paper(of: Evidence) -> tuple[np.ndarray, np.ndarray]:
     """
     light = 1 + np.float32(_IN_LIGHT) * (of.lit - SURPRISES[0])
     return np.float32(_LIKE_PAPER) * light, np.float32(_MORE) * of.weight * light
+
+
+def _prices(of: Evidence) -> np.ndarray:
+    """Return the prices of covers, and of those that look like paper, float32, shape (2, k)."""
+    return np.stack([np.full_like(of.weight, COVER), _like_paper(of)[0]])
 
 
 def _of_sectors(
@@ -351,8 +356,10 @@ def _steps(
     shares = np.clip(of_sectors @ spread.astype(np.float32), 0, 1)
     steps = np.rint(shares * np.float32(of.between.shape[1] + 1)).astype(np.uint8)
     count = family.bits * per_sector
-    at = (np.arange(count, dtype=np.int32) - phases[..., None].astype(np.int32)) % count
-    return np.take_along_axis(steps.reshape(*words.shape, count), at, axis=2)
+    twice = np.tile(steps.reshape(*words.shape, count), 2)
+    turns = np.lib.stride_tricks.sliding_window_view(twice, count, axis=2)
+    bands, number = np.ogrid[: len(words), : words.shape[1]]
+    return np.asarray(turns[bands, number, -phases % count])
 
 
 def _along_words(evidence: Evidence, steps: np.ndarray) -> np.ndarray:
@@ -370,8 +377,7 @@ def _covered_paths(seen: np.ndarray, as_paper: np.ndarray, of: Evidence) -> np.n
     From the evidence where they are seen, and where something like paper covers them, less its
     price, (m, k, w).
     """
-    price = np.stack([np.full_like(of.weight, COVER), _like_paper(of)[0]])[..., None]
-    cost = np.float32(_COVERED) * of.weight[:, None]
+    price, cost = _prices(of)[..., None], np.float32(_COVERED) * of.weight[:, None]
     clear = seen[0].copy()
     hidden = np.full((2, *clear.shape), _NEVER)
     (covered, like_paper), begun = hidden, np.empty_like(hidden)
@@ -409,23 +415,19 @@ def _backtracked(seen: np.ndarray, as_paper: np.ndarray, of: Evidence) -> np.nda
     """
     count, bands = seen.shape
     cost = np.broadcast_to(np.float32(_COVERED) * of.weight, seen.shape)
-    price, _ = _like_paper(of)
     gains = np.stack([seen, -cost, as_paper], axis=1)
     until, after = np.full((2, count, 3, bands), _NEVER)
     until[0, 0], after[-1] = seen[0], 0
-    cover = np.float32(COVER)
-    for index in range(1, count):
-        clear, covered, like_paper = until[index - 1]
-        of_clear, of_covered, of_paper = until[index]
-        np.maximum(np.maximum(clear, covered), like_paper, out=of_clear)
-        np.maximum(covered, clear - cover, out=of_covered)
-        np.maximum(like_paper, clear - price, out=of_paper)
-        until[index] += gains[index]
-        clear, covered, like_paper = after[-index] + gains[-index]
-        of_clear, of_covered, of_paper = after[-index - 1]
-        np.maximum(clear, covered, out=of_covered)
-        np.maximum(clear, like_paper, out=of_paper)
-        np.maximum(clear, np.maximum(covered - cover, like_paper - price), out=of_clear)
+    price = _prices(of)
+    for before, here, gain in zip(until, until[1:], gains[1:], strict=False):
+        np.maximum(np.maximum(before[0], before[1]), before[2], out=here[0])
+        np.maximum(before[1:], before[0] - price, out=here[1:])
+        here += gain
+    for later, here, gain in zip(after[::-1], after[-2::-1], gains[::-1], strict=False):
+        gained = later + gain
+        np.maximum(gained[0], gained[1:], out=here[1:])
+        begun = gained[1:] - price
+        np.maximum(gained[0], np.maximum(begun[0], begun[1]), out=here[0])
     whole = (until + after).transpose(1, 2, 0)
     return np.asarray(np.maximum(whole[1], whole[2]) > whole[0])
 

@@ -398,11 +398,17 @@ def _predicted(best: np.ndarray, weight: np.ndarray) -> np.ndarray:
     """
     price = np.float32(-np.log(SURPRISES[0]))
     gain = np.moveaxis(-best, 2, 0) - _FURTHER * weight
-    ahead, behind = np.zeros_like(gain), np.zeros_like(gain)
-    count = len(gain)
-    for step in range(1 - count, count):
-        ahead[step] = np.minimum(np.maximum(ahead[step - 1], -price), 0) + gain[step]
-        behind[-step - 1] = np.minimum(np.maximum(behind[-step] + gain[-step], 0), price)
+    # Ahead of an angle and, the other way round, behind it.
+    gains = np.stack([gain, gain[::-1]], axis=1)
+    low, high = (np.array(of, gain.dtype)[:, None, None] for of in ((-price, 0), (0, price)))
+    bounded = np.zeros_like(gains)
+    steps = list(zip(bounded, gains, strict=True))
+    path = np.stack([np.zeros_like(gain[0]), gain[-1]])
+    for of_step, of_gain in steps[1:] + steps:
+        np.maximum(path, low, out=of_step)
+        np.minimum(of_step, high, out=of_step)
+        np.add(of_step, of_gain, out=path)
+    ahead, behind = bounded[:, 0] + gain, bounded[::-1, 1]
     return np.moveaxis(ahead + behind <= 0, 0, 2)
 
 
