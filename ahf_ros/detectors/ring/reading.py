@@ -105,7 +105,8 @@ def _read_part(
     edges = edge_evidence(polar, np.ones(len(read)), growth, family.band, SHARES)
     words = decode(edges, _overhang(growth, family), family, prior.expected)
     # What is seen against anything is that of edges alone, whatever else there is.
-    asked = np.flatnonzero(words.seen > least[read])
+    enough = _of_reading(words.seen, words, edges.weight) > hopeful
+    asked = np.flatnonzero(enough & (words.seen > least[read]))
     if not asked.size:
         return unread
     if asked.size < read.size:
@@ -211,7 +212,12 @@ def _by_dot(fit: Fit, printed: Fit, growth: np.ndarray, which: np.ndarray) -> Fi
 
 def _mean_odds(words: Words, weight: np.ndarray) -> np.ndarray:
     """Return the log odds of words against no target for a reading, shape (k,)."""
-    mean: np.ndarray = np.minimum(words.marked, words.seen) / (weight * words.hidden.shape[1])
+    return _of_reading(np.minimum(words.marked, words.seen), words, weight)
+
+
+def _of_reading(odds: np.ndarray, words: Words, weight: np.ndarray) -> np.ndarray:
+    """Return log odds of words, shape (k,), for a reading."""
+    mean: np.ndarray = odds / (weight * words.hidden.shape[1])
     return mean
 
 
