@@ -38,7 +38,7 @@ _BLUR = 0.15  # px^2, variance that blur adds to a dot that is cut off at half o
 _MINIMUM_MINOR = 0.6  # px
 _MINIMUM_PIXELS = 4
 _FILLED = (0.7, 1.35)  # pixels of a dot over the area of its ellipse
-_STRIP = 2**24  # pixels looked at at a time, which bounds the memory
+_STRIP = 2**22  # pixels looked at at a time, so that memory is used again, not made anew
 _TILE = 32  # side of a tile, px; empty tiles are left out
 _MAXIMUM_TILES = 0.3  # of the image; where there are more, it is looked at as a whole
 
