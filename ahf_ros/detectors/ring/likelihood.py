@@ -230,8 +230,8 @@ def _covered(
     shadow = in_shadow.sum(axis=(1, 2)) > _MARKED * covered.sum(axis=(1, 2))
     covered &= ~shadow[:, None, None]
     # The border of what is as dark as ink looks like the edge of a mark.
-    as_ink = polar.logs(polar.inked(shade, ground))[0]
-    like_ink = [np.abs(polar.logs(of)[0] - as_ink) < LIGHT_EDGE for of in (ground, band)]
+    as_ink = polar.levels(polar.inked(shade, ground))
+    like_ink = [np.abs(polar.levels(of) - as_ink) < LIGHT_EDGE for of in (ground, band)]
     across = np.logical_and.reduce(like_ink[1], axis=1, keepdims=True)
     hidden = np.asarray(covered & like_ink[0])[:, ::-1] & across
     return np.asarray(covered | hidden)
@@ -269,16 +269,17 @@ def _step_evidence(
         polar.printed(polar.paper(ground, on_ground), on_band, band)
         for on_ground, on_band in (bare, marked)
     )
-    mark = polar.logs(ink)[0] - beside
+    mark = polar.levels(ink) - beside
     step = level - beside
     limit = polar.glare[:, None, None]
     glare, white = ground >= limit, np.minimum(*ground.swapaxes(0, 1))[:, None] >= SATURATED
     flat = np.where(white & (limit <= SATURATED), np.float32(_WHITE), np.float32(_FLAT))
     spread = np.sqrt(flat**2 + noise**2 + of_ground**2)
-    flat = normal(level - polar.logs(blank)[0], spread)
+    flat = normal(level - polar.levels(blank), spread)
     more = (step - mark) * np.sign(mark)
     expected = of_ground * _gain(ground, ink)
-    low, high = (np.sqrt(spread**2 + noise**2 + expected**2) for spread in (_MARK, _MARK_TAIL))
+    of_noise, of_ink = noise**2, expected**2
+    low, high = (np.sqrt(of**2 + of_noise + of_ink) for of in (_MARK, _MARK_TAIL))
     width = np.where(more > 0, high, low)
     inked = normal(more, width) * (2 * width / (low + high))
     if glare.any():
@@ -286,27 +287,24 @@ def _step_evidence(
         inked = np.where(less, np.maximum(inked, 1 / np.maximum(np.abs(mark), _FLAT)), inked)
     lit = edges.astype(np.float32)[:, None, None]
     densities = [flat, inked]
+    width = np.sqrt(_MARK**2 + (_SHARE * mark) ** 2 + of_noise + of_ink) if shares else low
     for share in shares:
         on_ground, on_band = (
             of_bare + np.float32(share) * (of_mark - of_bare)
             for of_bare, of_mark in zip(bare, marked, strict=True)
         )
         mixed = polar.printed(polar.paper(ground, on_ground), on_band, band)
-        width = np.sqrt(_MARK**2 + (_SHARE * mark) ** 2 + noise**2 + expected**2)
-        densities.append(normal(level - polar.logs(mixed)[0], width))
-    plain = [flat] * len(densities)
+        densities.append(normal(level - polar.levels(mixed), width))
+    anything = [_PLAIN * flat + (1 - _PLAIN) * _ANY] * len(densities)
     if shares:
         zero = np.zeros_like(spread)
         densities += [normal(zero, spread), normal(zero, (low + high) / 2)]
-        plain += [normal(zero, spread), normal(mark, spread)]
+        plain = normal(zero, spread), normal(mark, spread)
+        anything += [_PLAIN * of + (1 - _PLAIN) * _ANY for of in plain]
     clear = polar.tells(band)
     return [
-        np.where(
-            clear,
-            np.log(((1 - lit) * density + lit * _ANY) / (_PLAIN * of + (1 - _PLAIN) * _ANY)),
-            0,
-        )
-        for density, of in zip(densities, plain, strict=True)
+        np.where(clear, np.log(((1 - lit) * density + lit * _ANY) / of), 0)
+        for density, of in zip(densities, anything, strict=True)
     ]
 
 
@@ -342,12 +340,12 @@ def level_evidence(
     spread, inked = np.where(known, spread, 1), polar.printed(light, share, levels)
     of_paper = np.sqrt(_PAPER_LEVEL**2 + noise**2 + spread**2)
     of_ink = np.sqrt(_INK_LEVEL**2 + noise**2 + (spread * _gain(light, inked)) ** 2)
-    of_light, of_inked = polar.logs(light)[0], polar.logs(inked)[0]
+    of_light, of_inked = polar.levels(light), polar.levels(inked)
     errors = level - of_light
     densities = [normal(errors, of_paper), normal(level - of_inked, of_ink)]
     of_share = np.sqrt(of_ink**2 + (_SHARE * (of_inked - of_light)) ** 2)
     for of_mark in shares:
-        mixed = polar.logs(polar.printed(light, share * np.float32(of_mark), levels))[0]
+        mixed = polar.levels(polar.printed(light, share * np.float32(of_mark), levels))
         densities.append(normal(level - mixed, of_share))
     anything = _PLAIN * densities[0] + (1 - _PLAIN) * _ANY
     depth = np.minimum(_DEPTH * polar.size / CORRELATION, 1)

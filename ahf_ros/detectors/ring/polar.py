@@ -129,7 +129,9 @@ class PolarImages(ArrayRecord):
         polarity, contrast = (
             _along(of, paper).astype(np.float32) for of in (self.polarity, self.contrast)
         )
-        ink = np.where(polarity > 0, contrast * paper, paper / contrast)
+        one = np.float32(1)
+        ink = paper * np.where(polarity > 0, contrast, one)
+        ink /= np.where(polarity > 0, one, contrast)
         white = (seen >= SATURATED) & (polarity < 0)
         return np.where(white, np.minimum(ink, seen), ink) if white.any() else ink
 
@@ -155,6 +157,11 @@ class PolarImages(ArrayRecord):
         """Return ln(I + offset) of gray values (k, ...), and the deviation of its noise."""
         raised = np.maximum(values, 0) + np.float32(LOG_OFFSET)
         return np.log(raised), _along(self.noise, values).astype(np.float32) / raised
+
+    @staticmethod
+    def levels(values: np.ndarray) -> np.ndarray:
+        """Return ln(I + offset) of gray values."""
+        return np.asarray(np.log(np.maximum(values, 0) + np.float32(LOG_OFFSET)))
 
 
 def polar_images(

@@ -196,7 +196,7 @@ def _holes(polar: PolarImages, outer: np.ndarray) -> np.ndarray:
         return holes
     polar, outer = polar.select(bright), outer[bright]
     inside, outside = (
-        polar.logs(polar.at(radius).swapaxes(0, 1))[0]
+        polar.levels(polar.at(radius).swapaxes(0, 1))
         for radius in (DOT[:, None] * np.ones_like(outer), outer + MARGIN[:, None])
     )
     usual = medians(inside.reshape(len(outer), -1))[:, None, None]
