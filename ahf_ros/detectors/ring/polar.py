@@ -175,7 +175,8 @@ def polar_images(
     angles, (inner, outer) = angles_of(count), band
     outermost = outer + _MARGIN
     radii = np.linspace(_INNERMOST, outermost, circles)
-    values = np.maximum(sample_circles(gray, dots.frames, angles, radii), 0)
+    values = sample_circles(gray, dots.frames, angles, radii)
+    np.maximum(values, 0, out=values)
     contrast, lift = _appearance(gray, dots, band)
     values = lifted(values, lift.astype(np.float32)[:, None, None])
     places = [*(1 + (inner - 1) * GAP), *(outer + MARGIN)]
@@ -249,7 +250,7 @@ def _later(gap: np.ndarray, apart: np.ndarray) -> np.ndarray:
     count = gap.shape[1]
     lags = np.clip(np.ceil(CORRELATION / np.maximum(apart, 1e-9)), 1, count // 4).astype(np.intp)
     later = (np.arange(count) + lags[:, None]) % count
-    return np.take_along_axis(gap, later[..., None], axis=1)
+    return np.asarray(gap[np.arange(len(gap))[:, None], later])
 
 
 def _noise(gap: np.ndarray, later: np.ndarray) -> np.ndarray:
@@ -295,6 +296,11 @@ def _reach(
     centres = frames[:, :2, 2] / frames[:, 2:, 2]
     inside = (centres > farthest) & (centres < np.array(shape[1::-1]) - 1 - farthest)
     border = np.flatnonzero(~inside.all(axis=1))
+    # The outermost circle is whole about most of them.
+    circles = frame.project(frames[border], frame.circle_points(angles, radii[-1:]))
+    whole = within(circles, shape).all(axis=(1, 2))
+    reach[border] = radii[-1]
+    border = border[~whole]
     points = frame.project(frames[border], frame.circle_points(angles, radii))
     reach[border] = np.where(within(points, shape), radii, 0).max(axis=2)
     return reach
