@@ -34,6 +34,7 @@ _LEVELS = {-1: 0.62, 1: 0.4}  # of the step of ln, about halfway in gray values
 _REDUCTION = 4  # of the image in which the ground is looked for
 _REACH = 4  # px about a pixel, in which the highest step is looked for
 _NEAR = np.ones((2 * _REACH + 1, 2 * _REACH + 1), np.uint8)
+_BESIDE = np.ones((1, 3), np.uint8)
 _BLUR = 0.15  # px^2, variance that blur adds to a dot that is cut off at half of its height
 _MINIMUM_MINOR = 0.6  # px
 _MINIMUM_PIXELS = 4
@@ -149,6 +150,7 @@ def _connected(
 
     None has more pixels than a blob of a length, px; those of more length may be among them.
     """
+    column = np.ones((int(longest) + 1 | 1, 1), np.uint8)  # odd, as OpenCV shifts others
     none = np.zeros(0, np.int32)
     found: list[tuple[np.ndarray, ...]] = [(none, none, none)]
     for top, left, part, own in _parts(height, least):
@@ -160,13 +162,19 @@ def _connected(
             mask &= own
         if not mask.any():
             continue
-        # The default algorithm of OpenCV 4.5 crashes on large images with this connectivity.
-        count, labels = cv2.connectedComponentsWithAlgorithm(
-            mask.view(np.uint8), 4, cv2.CV_32S, cv2.CCL_SAUF
+        # A column of more pixels is part of a blob that is longer, as is what touches it.
+        rest = mask.view(np.uint8)
+        columns = cv2.morphologyEx(
+            rest, cv2.MORPH_OPEN, column, borderType=cv2.BORDER_CONSTANT, borderValue=0
         )
+        cv2.subtract(rest, columns, rest)
+        touching = np.flatnonzero(mask & cv2.dilate(columns, _BESIDE).view(bool))
+        # The default algorithm of OpenCV 4.5 crashes on large images with this connectivity.
+        count, labels = cv2.connectedComponentsWithAlgorithm(rest, 4, cv2.CV_32S, cv2.CCL_SAUF)
         places = np.flatnonzero(mask)
         label: np.ndarray = labels.ravel().take(places)
         area = np.bincount(label, minlength=count)
+        area[labels.ravel().take(touching)] = 0
         # A blob of more pixels is longer. How long the others are is measured on what is left.
         usable = (area >= _MINIMUM_PIXELS) & (area <= longest**2)
         of_usable = np.flatnonzero(usable.take(label))
