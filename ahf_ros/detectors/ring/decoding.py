@@ -114,13 +114,15 @@ def decode(
     family: Family,
     expected: frozenset[int] = frozenset(),
     *,
+    arcs: bool = True,
     looks: bool = True,
 ) -> Words:
     """Return the words with the most evidence, of k bands at m angles in the order of sectors.
 
     `overhang`, shape (k,), is by how many angles ink is longer at either end than its sectors;
     `expected` are IDs that are likely to be there. Empty: all IDs are equally likely. Without
-    `looks`, words stand for the sectors as they look as well.
+    `arcs` nothing else explains the marks, so that `coded` is 0, and without `looks` words stand
+    for the sectors as they look as well.
     """
     of_bands = without_outliers(evidence)
     count, angles = of_bands.paper.shape
@@ -182,14 +184,18 @@ def decode(
         other = np.take_along_axis(bits, turn % family.bits, 1) @ (1 << np.arange(family.bits))
     if (other != of_best).any():
         of_other = explained(other[:, None], phase[:, None])[-1][:, 0]
-    arcs, of_arcs = _free_paths(turned)
     inked, mixed = 2 * shown > last, (shown > 0) & (shown < last)
+    coded = np.zeros(len(read))
+    if arcs:
+        of_arcs, borders = _free_paths(turned)
+        price = _of_borders(inked, mixed, hidden, borders, _border(turned), family)
+        coded = score - of_arcs - price
     found = Words(
         words=of_best,
         starts=2 * np.pi * phase / angles,
         margin=margin.astype(np.float64),
         marked=score - bare + some.dot,
-        coded=score - arcs - _of_borders(inked, mixed, hidden, of_arcs, _border(turned), family),
+        coded=coded,
         ends=np.zeros(len(read)),
         other=other,
         ahead=of_other - score,

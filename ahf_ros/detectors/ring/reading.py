@@ -92,7 +92,7 @@ def _read_part(
     # In the frame of the printed dot, the same growth is a larger share.
     some = polar.select(read), edges, words.select(read)
     growth = growth / (1 - growth)
-    words = _settled(gray, printed, *some, growth, family, prior.expected, looks=False)
+    words = _settled(gray, printed, *some, growth, family, prior.expected, last=False)
     good = _mean_odds(words, edges.weight) > hopeful
     if not good.any():
         return unread
@@ -114,7 +114,7 @@ def _read_part(
         fit, polar = fit.select(asked), polar.select(asked)
         edges, words = edges.select(asked), words.select(asked)
     overhang = _overhang(growth, family)
-    words = _settled(gray, fit, polar, edges, words, growth, family, prior.expected, looks=True)
+    words = _settled(gray, fit, polar, edges, words, growth, family, prior.expected, last=True)
     words = with_ends(polar, words, overhang, edges.lit, family)
     words = replace(words, unlike=unlike_print(polar, words, growth, overhang, family))
     good = _mean_odds(words, edges.weight) > hopeful
@@ -162,12 +162,12 @@ def _settled(
     family: Family,
     expected: frozenset[int],
     *,
-    looks: bool,
+    last: bool,
 ) -> Words:
     """Return the words of targets, by all evidence where edges alone leave a doubt.
 
     Targets are in the frames of their printed dots, the unit of the growth of their colour, (k,).
-    For `looks` see `decode`.
+    What else there is than words is looked at in the `last` reading only.
     """
     some = np.flatnonzero(_doubtful(words, edges))
     if not some.size:
@@ -185,7 +185,8 @@ def _settled(
     growth = growth[some]
     of_levels = level_evidence(polar, levels, *light, radii, growth, family.band, SHARES)
     evidence = edges.plus(of_levels)
-    of_all = decode(evidence, _overhang(growth, family), family, expected, looks=looks)
+    overhang = _overhang(growth, family)
+    of_all = decode(evidence, overhang, family, expected, arcs=last, looks=last)
     hidden = of_all.hidden | (polar.reach < of_band[0])
     # What speaks against no target is that of edges, so that all targets compare.
     of_edges = words.select(some)
