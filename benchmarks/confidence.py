@@ -18,6 +18,7 @@ import numpy as np
 
 from ahf_ros.codes.ring import Family, canonical
 from ahf_ros.detectors.ring.confidence import WEIGHTS, confidence, features
+from ahf_ros.detectors.ring.contests import overlapping
 from ahf_ros.detectors.ring.detector import find_hypotheses
 from ahf_ros.detectors.ring.hypotheses import Hypotheses
 from ahf_ros.imaging.image import as_gray
@@ -52,20 +53,20 @@ def readings(seed: int) -> Parts:
         near = np.hypot(read.frames[:, :1, 2] - x, read.frames[:, 1:2, 2] - y) < NEAR
         right = (near & (ids[:, None] == number)).any(axis=1)
         seen = near.any(axis=1) | (not scene.others)
-        seen &= right | ~_on_right_ones(read, right)
+        seen &= right | ~_below_right_ones(read, right)
         condition = np.full(seen.sum(), scene.condition)
         yield condition, features(read.select(seen)), right[seen], read.hidden[seen]
 
 
-def _on_right_ones(read: Hypotheses, right: np.ndarray) -> np.ndarray:
-    """Return which readings lie on the target of a right one that leads by more, bool, (k,).
+def _below_right_ones(read: Hypotheses, right: np.ndarray) -> np.ndarray:
+    """Return which readings overlap the target of a right one with a larger margin, bool, (k,).
 
-    These are never reported, whatever their confidence is.
+    These are not reported, whatever their confidence is.
     """
-    x, y = read.frames[:, :2, 2].T
-    away = np.hypot(x[:, None] - x, y[:, None] - y)
-    on_target = away < np.maximum(read.reach[:, None], read.reach)
-    return np.asarray((on_target & right & (read.margin > read.margin[:, None])).any(axis=1))
+    over = np.array([overlapping(read)(index) for index in range(len(right))]).reshape(
+        -1, len(right)
+    )
+    return np.asarray((over & right & (read.margin > read.margin[:, None])).any(axis=1))
 
 
 def rising_regression(

@@ -65,7 +65,6 @@ _BLOCK = 1 << _SHIFT  # cells, side of a block
 _SPREAD = 1.4  # votes in a cell and beside it, in weighted votes, at the least
 _OWN = 1 / 8  # of the weighted votes of a peak, that its own cell has
 _WEIGHTS = (0.5, 1.0, 0.5)  # of votes for the cell before, for a cell itself, and the next one
-_OUTSIDE = cv2.BORDER_CONSTANT  # no votes are there
 _MOST_VOTES = 2**24  # that are counted at a time, which bounds the memory
 _FLAT = 1e-6  # curvature of votes from which their top is computed
 
@@ -262,7 +261,7 @@ def find_peaks(
         return _NO_PEAKS
     votes = np.zeros(planes * tall * wide, np.uint16)
     np.add.at(votes, rows[which] * np.int32(wide) + columns[which], np.uint16(1))
-    cells = np.flatnonzero(votes > _OWN * needed)
+    cells = np.flatnonzero(votes > np.uint16(_OWN * needed))
     sums = _weighted(votes, cells, wide)
     enough = sums > needed
     cells, sums = cells[enough], sums[enough]
@@ -270,11 +269,8 @@ def find_peaks(
     cells, sums = cells[kept], sums[kept]
     row, column = np.divmod(cells, wide)
     plane, row = np.divmod(row, tall)
-    x, y = (
-        middle
-        + _top(_weighted(votes, cells - step, wide), sums, _weighted(votes, cells + step, wide))
-        for middle, step in ((column, 1), (row, wide))
-    )
+    left, right, above, below = _weighted(votes, np.add.outer((-1, 1, -wide, wide), cells), wide)
+    x, y = column + _top(left, sums, right), row + _top(above, sums, below)
     return Peaks(x, y, plane.astype(int), sums / needed)
 
 
@@ -304,17 +300,18 @@ def _promising(
     of_blocks = np.zeros((tall, wide), np.uint16)
     np.add.at(of_blocks.ravel(), block, np.uint16(1))
     # A cell and its neighbours lie in two by two blocks.
-    of_four = cv2.boxFilter(of_blocks, -1, (2, 2), normalize=False, borderType=_OUTSIDE)
-    enough = (of_four > _SPREAD * needed).astype(np.uint8)
+    of_blocks[1:] += of_blocks[:-1]
+    of_blocks[:, 1:] += of_blocks[:, :-1]
+    enough = of_blocks > np.uint16(_SPREAD * needed)
     if not enough.any():
         return np.zeros(0, np.intp)
-    hot = cv2.dilate(enough, np.ones((2, 2), np.uint8), anchor=(0, 0))
-    return np.flatnonzero(hot.ravel().take(block))
+    hot = cv2.dilate(enough.view(np.uint8), np.ones((2, 2), np.uint8), anchor=(0, 0))
+    return np.flatnonzero(hot.view(bool).ravel().take(block))
 
 
 def _weighted(votes: np.ndarray, cells: np.ndarray, wide: int) -> np.ndarray:
-    """Return the votes in cells and, with less weight, beside them, float32, shape (k,)."""
-    sums = np.zeros(len(cells), np.float32)
+    """Return the votes in cells and, with less weight, beside them, float32, shape (..., k)."""
+    sums = np.zeros(cells.shape, np.float32)
     for down, of_row in zip((-wide, 0, wide), _WEIGHTS, strict=True):
         for across, of_column in zip((-1, 0, 1), _WEIGHTS, strict=True):
             beside = votes.take(cells + (down + across), mode='clip')

@@ -12,7 +12,7 @@ from ahf_ros.features import frame
 from ahf_ros.features.candidates import Candidates
 from ahf_ros.features.dots import NO_DOTS, Dots
 from ahf_ros.features.log_edges import LOG_SCALE
-from ahf_ros.features.robust import fit_linear
+from ahf_ros.features.robust import fit_linear, medians
 from ahf_ros.features.sampling import sample_circles
 
 _RAYS, _FEW_RAYS = 32, 24  # about an ellipse that is refined, and about a candidate
@@ -174,7 +174,7 @@ def resized(log: np.ndarray, dots: Dots) -> Dots:
     steps = outwards * (values[:, :, 2:] - values[:, :, :-2])
     displacement, _ = _strongest(steps, radii)
     frames = dots.frames.copy()
-    frames[:, :2, :2] *= 1 + np.median(displacement, axis=1)[:, None, None]
+    frames[:, :2, :2] *= 1 + medians(displacement)[:, None, None]
     return replace(dots, frames=frames)
 
 

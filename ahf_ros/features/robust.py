@@ -33,6 +33,15 @@ def median(values: np.ndarray, selected: np.ndarray, empty: float = 1.0) -> np.n
     return np.where(count > 0, middle, empty)
 
 
+def medians(values: np.ndarray) -> np.ndarray:
+    """Return the medians of many short rows, shape (k, m), none of them NaN, shape (k,).
+
+    They are those of `np.median`, which takes far longer to select than vector units to sort.
+    """
+    ordered, count = np.sort(values, axis=1), values.shape[1]
+    return np.asarray((ordered[:, (count - 1) // 2] + ordered[:, count // 2]) / 2)
+
+
 def spread(sizes: np.ndarray, selected: np.ndarray, minimum: float) -> np.ndarray:
     """Return robust standard deviations, shape (k, 1), from the medians of absolute errors (k, m).
 

@@ -34,11 +34,12 @@ _LEVELS = {-1: 0.62, 1: 0.4}  # of the step of ln, about halfway in gray values
 _REDUCTION = 4  # of the image in which the ground is looked for
 _REACH = 4  # px about a pixel, in which the highest step is looked for
 _NEAR = np.ones((2 * _REACH + 1, 2 * _REACH + 1), np.uint8)
+_BESIDE = np.ones((1, 3), np.uint8)
 _BLUR = 0.15  # px^2, variance that blur adds to a dot that is cut off at half of its height
 _MINIMUM_MINOR = 0.6  # px
 _MINIMUM_PIXELS = 4
 _FILLED = (0.7, 1.35)  # pixels of a dot over the area of its ellipse
-_STRIP = 2**24  # pixels looked at at a time, which bounds the memory
+_STRIP = 2**22  # pixels looked at at a time, so that memory is used again, not made anew
 _TILE = 32  # side of a tile, px; empty tiles are left out
 _MAXIMUM_TILES = 0.3  # of the image; where there are more, it is looked at as a whole
 
@@ -149,27 +150,37 @@ def _connected(
 
     None has more pixels than a blob of a length, px; those of more length may be among them.
     """
+    column = np.ones((int(longest) + 1 | 1, 1), np.uint8)  # odd, as OpenCV shifts others
     none = np.zeros(0, np.int32)
     found: list[tuple[np.ndarray, ...]] = [(none, none, none)]
     for top, left, part, own in _parts(height, least):
-        level = cv2.convertScaleAbs(
-            np.maximum(cv2.dilate(part, _NEAR), np.uint8(least)), alpha=share
-        )
-        mask = cv2.compare(part, level, cv2.CMP_GT)
+        level = cv2.dilate(part, _NEAR)
+        # In place, as new memory takes longer.
+        cv2.max(level, int(least), level)  # type: ignore[call-overload]
+        mask = part > cv2.convertScaleAbs(level, level, alpha=share)
         if own is not None:
-            mask = cv2.bitwise_and(mask, own)
+            mask &= own
         if not mask.any():
             continue
+        # A column of more pixels is part of a blob that is longer, as is what touches it.
+        rest = mask.view(np.uint8)
+        columns = cv2.morphologyEx(
+            rest, cv2.MORPH_OPEN, column, borderType=cv2.BORDER_CONSTANT, borderValue=0
+        )
+        cv2.subtract(rest, columns, rest)
+        touching = np.flatnonzero(mask & cv2.dilate(columns, _BESIDE).view(bool))
         # The default algorithm of OpenCV 4.5 crashes on large images with this connectivity.
-        count, labels = cv2.connectedComponentsWithAlgorithm(mask, 4, cv2.CV_32S, cv2.CCL_SAUF)
-        x, y = cv2.findNonZero(mask).reshape(-1, 2).T
-        label = labels[y, x]
+        count, labels = cv2.connectedComponentsWithAlgorithm(rest, 4, cv2.CV_32S, cv2.CCL_SAUF)
+        places = np.flatnonzero(mask)
+        label: np.ndarray = labels.ravel().take(places)
         area = np.bincount(label, minlength=count)
+        area[labels.ravel().take(touching)] = 0
         # A blob of more pixels is longer. How long the others are is measured on what is left.
         usable = (area >= _MINIMUM_PIXELS) & (area <= longest**2)
         of_usable = np.flatnonzero(usable.take(label))
         order = of_usable[np.argsort(label[of_usable], kind='stable')]
-        found.append((x[order] + left, y[order] + top, area[usable]))
+        y, x = np.divmod(places[order], mask.shape[1])
+        found.append((x + left, y + top, area[usable]))
     x, y, size = (np.concatenate(column) for column in zip(*found, strict=True))
     return x, y, size
 
@@ -195,11 +206,11 @@ def _parts(
     for number in range(1, count):
         column, row, columns, rows, _ = stats[number].tolist()
         own = labels[row : row + rows, column : column + columns] == number
-        own = np.kron(own.astype(np.uint8), np.full((_TILE, _TILE), 255, np.uint8))
+        own = np.kron(own, np.ones((_TILE, _TILE), bool))
         own = np.pad(own, _REACH)
         top, left = row * _TILE - _REACH, column * _TILE - _REACH
         bottom, right = top + own.shape[0], left + own.shape[1]
         own = own[max(-top, 0) :, max(-left, 0) :]
         top, left = max(top, 0), max(left, 0)
         part = height[top:bottom, left:right]
-        yield top, left, part, np.ascontiguousarray(own[: part.shape[0], : part.shape[1]])
+        yield top, left, part, own[: part.shape[0], : part.shape[1]]

@@ -45,6 +45,14 @@ def test_targets_look_like_their_words(name: str) -> None:
     assert 0 < spotted.max() < COVERED  # measured: 0.1 in the median
 
 
+def test_scratches_are_no_circles_of_another_print() -> None:
+    (sheet,) = Targets('metashape12', 12, 3).sheets()
+    dirt = occluders.scratches(6, (1 / 12, 3 / 12))
+    scratched = unlike(sheet.photograph(Exposure(occluder=dirt)), 'metashape12')
+    assert len(scratched) >= 12  # a dot may be read twice
+    assert np.median(scratched) < COVERED / 2  # measured: 0; 0.4 where radii do not count
+
+
 def test_other_prints_are_others_all_round() -> None:
     generator = np.random.default_rng(5)
     inks = [LOOKALIKES['two bands (RAD)'](family('aicon12'), generator) for _ in range(36)]

@@ -49,7 +49,8 @@ def test_the_margin_is_that_over_another_id_and_not_over_a_rotation() -> None:
     turned = word >> 1 | (word & 1) << 11
     words = np.array([[word, turned, other], [word, turned, turned]])
     scores = np.array([[9.0, 8.0, 3.0], [9.0, 8.0, 7.0]])
-    assert margins(words, scores, np.zeros(2, int), code).tolist() == [6.0, 2.0]
+    ids = canonical(words, code)[1]
+    assert margins(ids, scores, np.zeros(2, int)).tolist() == [6.0, 2.0]
 
 
 @pytest.mark.parametrize('name', ['metashape12', 'metashape20'])

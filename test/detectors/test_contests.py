@@ -23,7 +23,7 @@ def hypotheses(places: list[float], odds: list[float]) -> Hypotheses:
     return replace(
         Hypotheses.unread(made_up(places, radius=RADIUS), CODE),
         words=np.full(count, 71),
-        seen=np.array(odds, float),
+        marked=np.array(odds, float),
         confidence=np.ones(count),
     )
 
@@ -85,7 +85,7 @@ def test_of_two_targets_whose_bands_overlap_only_the_surer_one_is_certain(
 def test_parts_of_finds_stay_in_order():
     found = hypotheses([50, 150, 250], [3, 2, 1])
     parts = [found.select(np.array([2])), found.select(np.array([0, 1]))]
-    assert Hypotheses.joined(parts).seen.tolist() == [1, 3, 2]
+    assert Hypotheses.joined(parts).marked.tolist() == [1, 3, 2]
 
 
 def test_readings_are_taken_over_where_they_belong():

@@ -25,7 +25,7 @@ def seen(marked: np.ndarray, weight: float = 1.0) -> Evidence:
         paper=np.where(halves, absent, there),
         ink=np.where(halves, there, absent),
         between=np.zeros((count, 2, 0, marked.shape[1]), np.float32),
-        sharp=np.zeros((count, 2, 0, marked.shape[1]), np.float32),
+        typical=np.zeros((count, 2, 0, marked.shape[1]), np.float32),
         weight=np.full(count, weight, np.float32),
         dot=np.zeros(count, np.float32),
         lit=np.full(count, SURPRISES[0], np.float32),
@@ -183,10 +183,10 @@ def test_no_band_no_word() -> None:
     assert found.hidden.shape == (0, ANGLES)
 
 
-def test_sharp_edges_of_all_marks_and_of_all_paper_would_give_more() -> None:
+def test_what_is_typical_of_marks_and_of_paper_adds_up_along_a_word() -> None:
     clear = seen(WORD)
     paper, ink = np.full_like(clear.paper, 0.5), np.full_like(clear.ink, 1.0)  # of either half
-    found = read(replace(clear, sharp=np.stack([paper, ink], axis=2)))
+    found = read(replace(clear, typical=np.stack([paper, ink], axis=2)))
     of_angles = np.where(WORD, 2.0, 1.0)
-    assert found.sharp == pytest.approx((5 * np.tanh(of_angles / 5)).sum(), rel=0.02)
-    assert not read(clear).sharp.any()  # where no edges were given
+    assert found.typical == pytest.approx((5 * np.tanh(of_angles / 5)).sum(), rel=0.02)
+    assert not read(clear).typical.any()  # where no edges were given

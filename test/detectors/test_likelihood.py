@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from ahf_ros.detectors.ring.likelihood import (
+    SHARES,
     Evidence,
     band_edges,
     edge_evidence,
@@ -26,7 +27,7 @@ ONE, NONE = np.ones(1), np.zeros(1)
 
 
 def edges(of: PolarImages) -> Evidence:
-    return edge_evidence(of, ONE, NONE, BAND)
+    return edge_evidence(of, ONE, NONE, BAND, SHARES)
 
 
 def inside(low: float, high: float) -> np.ndarray:
@@ -157,12 +158,18 @@ def test_gaps_tell_how_often_light_has_edges() -> None:
     assert (edges(restless).ink[0, :, 1] < edges(calm).ink[0, :, 1]).all()
 
 
-def by_levels(of: PolarImages, light: float | None = 200.0, spread: float = 0.05) -> Evidence:
+def by_levels(
+    of: PolarImages,
+    light: float | None = 200.0,
+    spread: float = 0.05,
+    shares: tuple[float, ...] = (),
+) -> Evidence:
     """Return what levels say under light of a known spread; None: light as it is seen."""
     radii = np.array([0.5, 1.6, 2.6, 3.1, 3.9])
     values = np.stack([of.at(np.array([radius])) for radius in radii], axis=2)
     known = values if light is None else np.full_like(values, light)
-    return level_evidence(of, values, known, np.full_like(values, spread), radii, NONE, BAND)
+    known = known, np.full_like(values, spread)
+    return level_evidence(of, values, *known, radii, NONE, BAND, shares)
 
 
 @pytest.mark.parametrize(('polarity', 'paper'), [(1, 200.0), (-1, 50.0)])
@@ -200,7 +207,7 @@ def test_what_covers_the_ground_covers_the_edge_beside_it_and_the_levels() -> No
     target = polar(shade=100.0)
     target.gray[:, 5:8, inside(BAND[1], 9)] = 90.0
     of_steps = edges(target)
-    seen = by_levels(target)
+    seen = by_levels(target, shares=SHARES)
     both = of_steps.plus(seen)
     assert np.flatnonzero(both.covered.any(axis=1)).tolist() == [5, 6, 7]
     for name in ('paper', 'ink'):

@@ -36,6 +36,15 @@ def test_lines_corners_and_flat_ground_are_no_dots() -> None:
     assert not len(small_dots(log_image(image[:30]), 1.5, 8.0, (1, -1), LOG_SCALE).frames)
 
 
+def test_a_blob_beside_a_long_column_is_part_of_it_and_one_at_the_border_is_a_dot() -> None:
+    image = np.full((120, 160), 180, np.uint8)
+    image[20:100, 60:62] = 40
+    image[50:54, 62:65] = 40
+    image[:5, 20:25] = image[-5:, 100:105] = 40
+    found = small_dots(log_image(image), 1.5, 8.0, (1,), LOG_SCALE).frames[:, :2, 2]
+    assert sorted(found.round().tolist()) == [[22, 2], [102, 117]]
+
+
 def test_strips_of_large_images_show_the_same_dots(monkeypatch: pytest.MonkeyPatch) -> None:
     generator = np.random.default_rng(3)
     places = [(x, y) for x in range(20, 300, 24) for y in range(20, 600, 24)]

@@ -7,7 +7,7 @@ from functools import cache, lru_cache
 import numpy as np
 
 from ahf_ros.codes.cyclic import rotated_words
-from ahf_ros.codes.ring import Family, canonical
+from ahf_ros.codes.ring import Family
 
 _EXHAUSTIVE = 50_000  # rotations of words, up to which all of them compete
 _MINIMUM_EVIDENCE = 0.5  # for ones, in units of ln
@@ -120,13 +120,13 @@ def prior(words: np.ndarray, family: Family, expected: frozenset[int]) -> np.nda
     return np.where(likely, np.float32(0), np.float32(-_UNEXPECTED))
 
 
-def margins(words: np.ndarray, scores: np.ndarray, best: np.ndarray, family: Family) -> np.ndarray:
+def margins(ids: np.ndarray, scores: np.ndarray, best: np.ndarray) -> np.ndarray:
     """Return the evidence for the best words, indices (k,), over those of other IDs, shape (k,).
 
-    From words and the evidence for each, shape (k, c). Where all are rotations of one, other IDs
-    have less evidence than the last of these.
+    From the IDs of words and the evidence for each, shape (k, c). Where all are rotations of one,
+    other IDs have less evidence than the last of these.
     """
-    ids, rows = canonical(words, family)[1], np.arange(len(words))
+    rows = np.arange(len(ids))
     others = np.where(ids == ids[rows, best][:, None], -np.inf, scores).max(axis=1)
     others = np.where(np.isfinite(others), others, scores.min(axis=1))
     return np.asarray(scores[rows, best] - others)

@@ -65,17 +65,17 @@ def resolve(hypotheses: Hypotheses, ids: np.ndarray) -> tuple[np.ndarray, np.nda
     sectors and are dropped. Certain stays what neither another reading of its dot, nor a target
     whose band overlaps, nor another claim to its ID comes near to.
     """
-    seen, order = hypotheses.seen, np.arange(len(ids))
+    marked, order = hypotheses.marked, np.arange(len(ids))
     on_it = on_targets(hypotheses, hypotheses.certain)
 
     def against(index: int) -> np.ndarray:
         return on_it(index) & (ids != ids[index]) & (order > index)
 
     kept = owners(len(ids), on_it)
-    certain = kept & leading(seen, hypotheses.certain, against, _CLEARLY, CLEAR)
+    certain = kept & leading(marked, hypotheses.certain, against, _CLEARLY, CLEAR)
     sure = 1 / (1 - hypotheses.confidence + np.finfo(float).eps)
-    certain = leading(sure, certain, _overlapping(hypotheses), _ON_TOP)
-    return kept, leading(seen, certain, lambda index: ids == ids[index], _CLEARLY)
+    certain = leading(sure, certain, overlapping(hypotheses), _ON_TOP)
+    return kept, leading(marked, certain, lambda index: ids == ids[index], _CLEARLY)
 
 
 def on_targets(hypotheses: Hypotheses, certain: np.ndarray) -> Rivals:
@@ -85,8 +85,8 @@ def on_targets(hypotheses: Hypotheses, certain: np.ndarray) -> Rivals:
     return lambda index: np.hypot(*(centres - centres[index]).T) < reach[index]
 
 
-def _overlapping(hypotheses: Hypotheses) -> Rivals:
-    """Return of which hypotheses the bands overlap.
+def overlapping(hypotheses: Hypotheses) -> Rivals:
+    """Return of which hypotheses the bands overlap that of one.
 
     There the paper of one target lies on that of the other. White paper on white paper may hide
     marks without a trace, so that only the one on top is certain, which is the surer one.

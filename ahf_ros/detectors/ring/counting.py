@@ -50,7 +50,7 @@ def estimate_count(image: np.ndarray, settings: DetectorSettings | None = None) 
     minimum, maximum = settings.radii
     # Which of several words it is does not matter here.
     no_doubt = np.full(len(read.words), CLEAR)
-    clear = replace(read, margin=no_doubt, ends=no_doubt, coded=_OF_WORDS * read.coded)
+    clear = replace(read, margin=no_doubt, coded=_OF_WORDS * read.coded)
     probability = np.where(read.words > 0, target_probability(features(clear)), 0.0)
     counted = (probability > 0.5) & (major >= minimum) & (major <= maximum)
     order = np.argsort(-read.seen[counted], kind='stable')

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ahf_ros.codes.ring import Family
+from ahf_ros.codes.ring import Family, canonical
 from ahf_ros.detectors.ring.codewords import best_words, likeliest_bits, margins, prior
 from ahf_ros.detectors.ring.likelihood import SURPRISES, Evidence
 from ahf_ros.features.array_record import ArrayRecord
@@ -27,7 +27,7 @@ _RANKED = 1.2  # evidence of a reading that ranks words, which one cover must no
 _DRAW = 5.0  # lead of a word that is not expected, which is as good as none
 _NEAR = 3  # angles on either side of the clearest one
 _REFINED = 2  # best words, that compete at the phases beside theirs as well
-_PHASE = 0.5  # error of the phase of sectors, angles
+_PHASE = 0.6  # error of the phase of sectors, angles
 _NEVER = np.float32(-np.inf)
 
 COVER = 6.0
@@ -110,11 +110,16 @@ def decode(
     overhang: np.ndarray,
     family: Family,
     expected: frozenset[int] = frozenset(),
+    *,
+    arcs: bool = True,
+    looks: bool = True,
 ) -> Words:
     """Return the words with the most evidence, of k bands at m angles in the order of sectors.
 
     `overhang`, shape (k,), is by how many angles ink is longer at either end than its sectors;
-    `expected` are IDs that are likely to be there. Empty: all IDs are equally likely.
+    `expected` are IDs that are likely to be there. Empty: all IDs are equally likely. Without
+    `arcs` nothing else explains the marks, so that `coded` is 0, and without `looks` words stand
+    for the sectors as they look as well.
     """
     of_bands = without_outliers(evidence)
     count, angles = of_bands.paper.shape
@@ -137,57 +142,64 @@ def decode(
         ink=np.take_along_axis(some.ink, order, 1),
         between=np.take_along_axis(some.between, order[:, None], 2),
     )
+    _, more = _like_paper(some)
     like_paper = np.take_along_axis(
         np.maximum(some.paper, _half_paper(evidence.select(read))), order, axis=1
     )
+    under_paper, on_mark = turned.paper - more[:, None], like_paper - more[:, None]
     last = some.between.shape[1] + 1
 
     def explained(words: np.ndarray, phases: np.ndarray) -> tuple[np.ndarray, ...]:
         """Return what words show, the evidence for them along bands, with covers, and in all."""
-        steps = _steps(words, phases, ends, some, family)
-        shown = np.take_along_axis(steps, order[:, None], axis=2)
+        shown = _steps(words, phases - order[:, :1], ends, some, family)
         seen = _along_words(turned, shown)
         marked = (2 * shown > last).transpose(2, 0, 1)
-        as_paper = np.where(marked, like_paper.T[..., None], turned.paper.T[..., None])
-        return steps, seen, as_paper, _covered_paths(seen, as_paper, turned)
+        as_paper = np.where(marked, on_mark.T[..., None], under_paper.T[..., None])
+        return shown, seen, as_paper, _covered_paths(seen, as_paper, turned)
 
     steps, evidence_of, as_paper, scores = explained(words, phases)
+    ids = canonical(words, family)[1]
     likely = scores + prior(words, family, expected)
     rows, best = np.arange(len(read)), likely.argmax(axis=1)
     # What is expected wins a draw, but an ID that is read clearly is no other one.
-    read_as, known_as = (margins(words, of, best, family) for of in (scores, likely))
+    read_as, known_as = (margins(ids, of, best) for of in (scores, likely))
     margin = np.clip(known_as, read_as, read_as + _DRAW)
     of_word = evidence_of[:, rows, best], as_paper[:, rows, best]
     turned_hidden = _hidden(*of_word, scores[rows, best], turned)
-    hidden = np.empty(turned_hidden.shape, bool)
+    shown, hidden = np.empty(order.shape, np.uint8), np.empty(order.shape, bool)
+    np.put_along_axis(shown, order, steps[rows, best], axis=1)
     np.put_along_axis(hidden, order, turned_hidden, axis=1)
     hidden |= (some.paper == 0) & (some.ink == 0)
     score = scores[rows, best].astype(np.float64)
-    arcs, of_arcs = _free_paths(turned)
-    of_best = steps[rows, best]
-    of_best_word = 2 * of_best > last, (of_best > 0) & (of_best < last)
-    # Covers may be as long as they like, as arcs of any length may.
-    one = (of[..., None] for of in of_word)
-    of_any_length = _covered_paths(*one, turned, _COVERED)[:, 0].astype(np.float64)
-    borders = _of_borders(*of_best_word, hidden, of_arcs, _border(turned), family)
     bare = np.maximum(turned.paper.sum(axis=1), 0)
-    at_phase = phases[rows, best] % per_sector
-    looks, _ = likeliest_bits(ones[read, at_phase], pairs[read, at_phase])
-    # The phases of words begin at any of the sectors.
-    turn = phases[rows, best] // per_sector
-    looks = np.take_along_axis(looks, (turn[:, None] + np.arange(family.bits)) % family.bits, 1)
-    other = looks @ (1 << np.arange(family.bits))
-    *_, of_other = explained(other[:, None], phases[rows, best][:, None])
+    of_best, phase = words[rows, best], phases[rows, best]
+    other, of_other = of_best, score
+    if looks:
+        bits, _ = likeliest_bits(*(of[read, phase % per_sector] for of in (ones, pairs)))
+        # The phases of words begin at any of the sectors.
+        turn = phase[:, None] // per_sector + np.arange(family.bits)
+        other = np.take_along_axis(bits, turn % family.bits, 1) @ (1 << np.arange(family.bits))
+    if (other != of_best).any():
+        of_other = explained(other[:, None], phase[:, None])[-1][:, 0]
+    inked, mixed = 2 * shown > last, (shown > 0) & (shown < last)
+    coded = np.zeros(len(read))
+    if arcs:
+        of_arcs, borders = _free_paths(turned)
+        price = _of_borders(inked, mixed, hidden, borders, _border(turned), family)
+        # Covers may be as long as they like, as arcs may.
+        clear, as_paper = (of[..., None] for of in of_word)
+        long = as_paper + np.float32(1 - _COVERED / _MORE) * more[:, None]
+        coded = _covered_paths(clear, long, turned)[:, 0].astype(np.float64) - of_arcs - price
     found = Words(
-        words=words[rows, best],
-        starts=2 * np.pi * phases[rows, best] / angles,
+        words=of_best,
+        starts=2 * np.pi * phase / angles,
         margin=margin.astype(np.float64),
         marked=score - bare + some.dot,
-        coded=of_any_length - arcs - borders,
+        coded=coded,
         other=other,
-        ahead=of_other[:, 0] - score,
+        ahead=of_other - score,
         seen=score,
-        typical=_typical(some, of_best_word[0], hidden),
+        typical=_typical(some, inked, hidden),
         unlike=np.zeros(len(read)),
         hidden=hidden,
     )
@@ -249,13 +261,18 @@ def _half_paper(evidence: Evidence) -> np.ndarray:
     return _bounded(half, evidence)
 
 
-def _like_paper(of: Evidence, further: float = _MORE) -> tuple[np.ndarray, np.ndarray]:
+def _like_paper(of: Evidence) -> tuple[np.ndarray, np.ndarray]:
     """Return the prices of something that looks like paper, of its first reading and of more.
 
     Where light has many edges, it explains what looks like paper on a mark. float32, shape (k,).
     """
     light = 1 + np.float32(_IN_LIGHT) * (of.lit - SURPRISES[0])
-    return np.float32(_LIKE_PAPER) * light, np.float32(further) * of.weight * light
+    return np.float32(_LIKE_PAPER) * light, np.float32(_MORE) * of.weight * light
+
+
+def _prices(of: Evidence) -> np.ndarray:
+    """Return the prices of covers, and of those that look like paper, float32, shape (2, k)."""
+    return np.stack([np.full_like(of.weight, COVER), _like_paper(of)[0]])
 
 
 def _of_sectors(
@@ -344,8 +361,10 @@ def _steps(
     shares = np.clip(of_sectors @ spread.astype(np.float32), 0, 1)
     steps = np.rint(shares * np.float32(of.between.shape[1] + 1)).astype(np.uint8)
     count = family.bits * per_sector
-    at = (np.arange(count, dtype=np.int32) - phases[..., None].astype(np.int32)) % count
-    return np.take_along_axis(steps.reshape(*words.shape, count), at, axis=2)
+    twice = np.tile(steps.reshape(*words.shape, count), 2)
+    turns = np.lib.stride_tricks.sliding_window_view(twice, count, axis=2)
+    bands, number = np.ogrid[: len(words), : words.shape[1]]
+    return np.asarray(turns[bands, number, -phases % count])
 
 
 def _along_words(evidence: Evidence, steps: np.ndarray) -> np.ndarray:
@@ -357,24 +376,24 @@ def _along_words(evidence: Evidence, steps: np.ndarray) -> np.ndarray:
     return np.take(np.ascontiguousarray(every), first + steps.transpose(2, 0, 1))
 
 
-def _covered_paths(
-    seen: np.ndarray, as_paper: np.ndarray, of: Evidence, further: float = _MORE
-) -> np.ndarray:
+def _covered_paths(seen: np.ndarray, as_paper: np.ndarray, of: Evidence) -> np.ndarray:
     """Return the evidence for words with their best covers, (k, w).
 
-    From the evidence where they are seen, and where something like paper covers them, (m, k, w);
-    `further` is the price of each of its readings but the first.
+    From the evidence where they are seen, and where something like paper covers them, less its
+    price, (m, k, w).
     """
-    cost = np.float32(_COVERED) * of.weight[:, None]
-    price, more = (of_cover[:, None] for of_cover in _like_paper(of, further))
-    clear = seen[0]
-    covered, like_paper = (np.full_like(clear, _NEVER) for _ in range(2))
+    price, cost = _prices(of)[..., None], np.float32(_COVERED) * of.weight[:, None]
+    clear = seen[0].copy()
+    hidden = np.full((2, *clear.shape), _NEVER)
+    (covered, like_paper), begun = hidden, np.empty_like(hidden)
     for of_angle, of_paper in zip(seen[1:], as_paper[1:], strict=True):
-        before = clear
-        clear = np.maximum(np.maximum(clear, covered), like_paper) + of_angle
-        covered = np.maximum(covered, before - np.float32(COVER)) - cost
-        like_paper = np.maximum(like_paper, before - price)
-        like_paper += of_paper - more
+        np.subtract(clear, price, out=begun)
+        np.maximum(clear, covered, out=clear)
+        np.maximum(clear, like_paper, out=clear)
+        clear += of_angle
+        np.maximum(hidden, begun, out=hidden)
+        covered -= cost
+        like_paper += of_paper
     return np.maximum(np.maximum(clear, covered), like_paper)
 
 
@@ -401,23 +420,19 @@ def _backtracked(seen: np.ndarray, as_paper: np.ndarray, of: Evidence) -> np.nda
     """
     count, bands = seen.shape
     cost = np.broadcast_to(np.float32(_COVERED) * of.weight, seen.shape)
-    price, more = _like_paper(of)
-    gains = np.stack([seen, -cost, as_paper - more], axis=1)
+    gains = np.stack([seen, -cost, as_paper], axis=1)
     until, after = np.full((2, count, 3, bands), _NEVER)
     until[0, 0], after[-1] = seen[0], 0
-    cover = np.float32(COVER)
-    for index in range(1, count):
-        clear, covered, like_paper = until[index - 1]
-        of_clear, of_covered, of_paper = until[index]
-        np.maximum(np.maximum(clear, covered), like_paper, out=of_clear)
-        np.maximum(covered, clear - cover, out=of_covered)
-        np.maximum(like_paper, clear - price, out=of_paper)
-        until[index] += gains[index]
-        clear, covered, like_paper = after[-index] + gains[-index]
-        of_clear, of_covered, of_paper = after[-index - 1]
-        np.maximum(clear, covered, out=of_covered)
-        np.maximum(clear, like_paper, out=of_paper)
-        np.maximum(clear, np.maximum(covered - cover, like_paper - price), out=of_clear)
+    price = _prices(of)
+    for before, here, gain in zip(until, until[1:], gains[1:], strict=False):
+        np.maximum(np.maximum(before[0], before[1]), before[2], out=here[0])
+        np.maximum(before[1:], before[0] - price, out=here[1:])
+        here += gain
+    for later, here, gain in zip(after[::-1], after[-2::-1], gains[::-1], strict=False):
+        gained = later + gain
+        np.maximum(gained[0], gained[1:], out=here[1:])
+        begun = gained[1:] - price
+        np.maximum(gained[0], np.maximum(begun[0], begun[1]), out=here[0])
     whole = (until + after).transpose(1, 2, 0)
     return np.asarray(np.maximum(whole[1], whole[2]) > whole[0])
 
@@ -476,18 +491,34 @@ def _free_paths(evidence: Evidence) -> tuple[np.ndarray, np.ndarray]:
     looks = np.stack([evidence.paper, evidence.ink]).transpose(2, 0, 1)
     between = evidence.between.max(axis=1, initial=0).T
     mixed = np.maximum(np.maximum(looks[:, 0], looks[:, 1]), between) - _border(evidence)
-    seen, covered = looks[0], np.full_like(cost, _NEVER)  # of paths that end on paper or ink
-    borders, of_covered = np.zeros(seen.shape, np.intp), np.zeros(cost.shape, np.intp)
-    for here, border in zip(looks[1:], mixed[1:], strict=True):
+    paths = np.full((len(looks), 3, len(cost)), _NEVER)  # that end on paper, on ink or covered
+    paths[0, :2] = looks[0]
+    band, covers = paths[:, :2], paths[:, 2]
+    seen, covered = band[0], covers[0]
+    for here, border, of_seen, of_covered in zip(
+        looks[1:], mixed[1:], band[1:], covers[1:], strict=True
+    ):
         begun = np.maximum(seen[0], seen[1]) - cover
-        of_begun = borders[0] + (seen[1] > seen[0]) * (borders[1] - borders[0])
-        turned, of_turned = seen[::-1] + border, borders[::-1] + 1
         stayed = np.maximum(seen, covered) + here
-        of_stayed = borders + (covered > seen) * (of_covered - borders)
-        borders = of_stayed + (turned > stayed) * (of_turned - of_stayed)
-        seen = np.maximum(stayed, turned)
-        of_covered = of_covered + (begun > covered) * (of_begun - of_covered)
-        covered = np.maximum(covered, begun) - cost
-    ends = np.concatenate([seen, covered[None]])
-    best, of_ends = ends.argmax(axis=0), np.concatenate([borders, of_covered[None]])
-    return ends.max(axis=0), of_ends[best, np.arange(len(best))]
+        np.maximum(stayed, seen[::-1] + border, out=of_seen)
+        np.subtract(np.maximum(covered, begun), cost, out=of_covered)
+        seen, covered = of_seen, of_covered
+    # Where the paths come from is compared as above, for all angles at once.
+    seen, covered = band[:-1], covers[:-1, None]
+    paper, ink = seen.swapaxes(0, 1)
+    stayed = np.maximum(seen, covered) + looks[1:]
+    origin = np.empty((len(looks) - 1, 3, len(cost)), np.intp)
+    origin[:, :2] = np.where(covered > seen, 2, [[0], [1]])
+    turned = np.zeros(origin.shape, bool)
+    turned[:, :2] = seen[:, ::-1] + mixed[1:, None] > stayed
+    np.copyto(origin[:, :2], [[1], [0]], where=turned[:, :2])
+    origin[:, 2] = np.where(np.maximum(paper, ink) - cover > covers[:-1], ink > paper, 2)
+    origin *= len(cost)
+    origin += np.arange(len(cost))
+    place, places = paths[-1].argmax(axis=0) * len(cost) + np.arange(len(cost)), []
+    for of_angle in origin.reshape(len(origin), -1)[::-1]:
+        places.append(place)
+        place = of_angle[place]
+    ends = turned.reshape(len(origin), -1)[::-1]
+    borders = np.take_along_axis(ends, np.reshape(places, (len(ends), -1)), axis=1).sum(axis=0)
+    return paths[-1].max(axis=0), borders

@@ -122,21 +122,25 @@ def _turned(of_shifts: np.ndarray) -> np.ndarray:
 
 def _places(
     reach: float, angles: np.ndarray, radii: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Return rows and columns of cells at points, and how far beyond each lies, (m, d) each."""
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the indices of cells at points, and how far down and across each lies, (m, d)."""
     unit = _CELLS / (2 * reach)
     across, down = (
         np.outer(of(angles), radii) * unit + (_CELLS - 1) / 2 for of in (np.cos, np.sin)
     )
     row, column = down.astype(np.intp), across.astype(np.intp)
-    return row, column, down - row, across - column
+    return row * _TRANSFORM + column, down - row, across - column
 
 
 def _read(
-    images: np.ndarray, row: np.ndarray, column: np.ndarray, down: np.ndarray, across: np.ndarray
+    images: np.ndarray, place: np.ndarray, down: np.ndarray, across: np.ndarray
 ) -> np.ndarray:
     """Return the interpolated values of images (k, n, n) at places, shape (k, m, d)."""
-    above = images[:, row, column] * (1 - across) + images[:, row, column + 1] * across
-    below = images[:, row + 1, column] * (1 - across) + images[:, row + 1, column + 1] * across
-    read: np.ndarray = above * (1 - down) + below * down
+    values = images.reshape(len(images), -1)
+    below = place + _TRANSFORM
+    upper, lower = (
+        values.take(left, axis=1) * (1 - across) + values.take(left + 1, axis=1) * across
+        for left in (place, below)
+    )
+    read: np.ndarray = upper * (1 - down) + lower * down
     return read

@@ -35,6 +35,7 @@ _PAPER_LEVEL, _INK_LEVEL = 0.05, 0.12  # of levels of paper and ink under predic
 _ANY = 0.22  # density of steps and levels of ln where anything lies
 _PLAIN = 0.35  # share of what lies about any dot that is as flat as ground
 _MARKED = 0.2  # share of what is dark that has marks, from which it is in shadow
+_AT_ENDS = 0.25  # probability that an end of an arc does not look as blur alone makes it
 _FURTHER = 0.1  # price of each further reading in light that nothing predicts
 _UNLIKELY = 2.5  # standard deviations, from which a level was not predicted
 _ACROSS = (0.3, 0.75)  # shares of the gap, between which edges of light show
@@ -79,7 +80,7 @@ class Evidence(ArrayRecord):
     lit : ndarray of float32, shape (k,)
         Probability that an edge of light lies between two neighbouring readings.
     covered : ndarray of bool, shape (k, 2, m)
-        Where something covers the ground beside the band.
+        Where something covers the ground beside the band; only where shares of ink are asked for.
     blur : ndarray of float64, shape (k,)
         Of ends of arcs, standard deviation in angles.
     """
@@ -169,12 +170,15 @@ def edge_evidence(
         of_dot + _blurred(polar, at, inner, outer)
         for of_dot, at in zip(bare, (ground_at, band_at), strict=True)
     ]
-    lit_ground = np.maximum(ground, polar.paper(ground, marked[0]))
     paper, ink, *between = _step_evidence(polar, inside, ground, edges, bare, marked, shares)
     between, typical = between[: len(shares)], between[len(shares) :]
     weight = weights(polar)
     visible = polar.reach[:, None] >= np.stack([inner + within, outer + beside], axis=1)[..., None]
     share = weight[:, None, None] * visible
+    covered = np.zeros(visible.shape, bool)
+    if shares:
+        lit_ground = np.maximum(ground, polar.paper(ground, marked[0]))
+        covered = _covered(polar, inside, lit_ground, ink > paper, visible)
     return Evidence(
         paper=paper * share,
         ink=ink * share,
@@ -183,7 +187,7 @@ def edge_evidence(
         weight=weight,
         dot=np.zeros_like(weight),
         lit=edges.astype(np.float32),
-        covered=_covered(polar, inside, lit_ground, ink > paper, visible),
+        covered=covered,
         blur=_blur_along(polar, band),
     )
 
@@ -227,8 +231,8 @@ def _covered(
     shadow = in_shadow.sum(axis=(1, 2)) > _MARKED * covered.sum(axis=(1, 2))
     covered &= ~shadow[:, None, None]
     # The border of what is as dark as ink looks like the edge of a mark.
-    as_ink = polar.logs(polar.inked(shade, ground))[0]
-    like_ink = [np.abs(polar.logs(of)[0] - as_ink) < LIGHT_EDGE for of in (ground, band)]
+    as_ink = polar.levels(polar.inked(shade, ground))
+    like_ink = [np.abs(polar.levels(of) - as_ink) < LIGHT_EDGE for of in (ground, band)]
     across = np.logical_and.reduce(like_ink[1], axis=1, keepdims=True)
     hidden = np.asarray(covered & like_ink[0])[:, ::-1] & across
     return np.asarray(covered | hidden)
@@ -267,16 +271,17 @@ def _step_evidence(
         polar.printed(polar.paper(ground, on_ground), on_band, band)
         for on_ground, on_band in (bare, marked)
     )
-    mark = polar.logs(ink)[0] - beside
+    mark = polar.levels(ink) - beside
     step = level - beside
     limit = polar.glare[:, None, None]
     glare, white = ground >= limit, np.minimum(*ground.swapaxes(0, 1))[:, None] >= SATURATED
     flat = np.where(white & (limit <= SATURATED), np.float32(_WHITE), np.float32(_FLAT))
     spread = np.sqrt(flat**2 + noise**2 + of_ground**2)
-    flat = normal(level - polar.logs(blank)[0], spread)
+    flat = normal(level - polar.levels(blank), spread)
     more = (step - mark) * np.sign(mark)
     expected = of_ground * _gain(ground, ink)
-    low, high = (np.sqrt(spread**2 + noise**2 + expected**2) for spread in (_MARK, _MARK_TAIL))
+    of_noise, of_ink = noise**2, expected**2
+    low, high = (np.sqrt(of**2 + of_noise + of_ink) for of in (_MARK, _MARK_TAIL))
     width = np.where(more > 0, high, low)
     inked = normal(more, width) * (2 * width / (low + high))
     if glare.any():
@@ -284,22 +289,24 @@ def _step_evidence(
         inked = np.where(less, np.maximum(inked, 1 / np.maximum(np.abs(mark), _FLAT)), inked)
     lit = edges.astype(np.float32)[:, None, None]
     densities = [flat, inked]
+    width = np.sqrt(_MARK**2 + (_SHARE * mark) ** 2 + of_noise + of_ink) if shares else low
     for share in shares:
         on_ground, on_band = (
             of_bare + np.float32(share) * (of_mark - of_bare)
             for of_bare, of_mark in zip(bare, marked, strict=True)
         )
         mixed = polar.printed(polar.paper(ground, on_ground), on_band, band)
-        width = np.sqrt(_MARK**2 + (_SHARE * mark) ** 2 + noise**2 + expected**2)
-        densities.append(normal(level - polar.logs(mixed)[0], width))
-    plain = [flat] * len(densities)
+        densities.append(normal(level - polar.levels(mixed), width))
+    anything = [_PLAIN * flat + (1 - _PLAIN) * _ANY] * len(densities)
     if shares:
         zero = np.zeros_like(spread)
         densities += [normal(zero, spread), normal(zero, (low + high) / 2)]
-        plain += [normal(zero, spread), normal(mark, spread)]
+        plain = normal(zero, spread), normal(mark, spread)
+        anything += [_PLAIN * of + (1 - _PLAIN) * _ANY for of in plain]
+    doubts = [lit, lit, *[np.maximum(lit, np.float32(_AT_ENDS))] * len(shares), lit, lit]
     odds = [
-        np.log(((1 - lit) * density + lit * _ANY) / (_PLAIN * of + (1 - _PLAIN) * _ANY))
-        for density, of in zip(densities, plain, strict=True)
+        np.log(((1 - doubt) * density + doubt * _ANY) / of)
+        for doubt, density, of in zip(doubts, densities, anything, strict=False)
     ]
     if shares:
         at_edge = lit * np.log(lit / (1 - _PLAIN))
@@ -340,12 +347,12 @@ def level_evidence(
     spread, inked = np.where(known, spread, 1), polar.printed(light, share, levels)
     of_paper = np.sqrt(_PAPER_LEVEL**2 + noise**2 + spread**2)
     of_ink = np.sqrt(_INK_LEVEL**2 + noise**2 + (spread * _gain(light, inked)) ** 2)
-    of_light, of_inked = polar.logs(light)[0], polar.logs(inked)[0]
+    of_light, of_inked = polar.levels(light), polar.levels(inked)
     errors = level - of_light
     densities = [normal(errors, of_paper), normal(level - of_inked, of_ink)]
     of_share = np.sqrt(of_ink**2 + (_SHARE * (of_inked - of_light)) ** 2)
     for of_mark in shares:
-        mixed = polar.logs(polar.printed(light, share * np.float32(of_mark), levels))[0]
+        mixed = polar.levels(polar.printed(light, share * np.float32(of_mark), levels))
         densities.append(normal(level - mixed, of_share))
     anything = _PLAIN * densities[0] + (1 - _PLAIN) * _ANY
     depth = np.minimum(_DEPTH * polar.size / CORRELATION, 1)
@@ -396,11 +403,17 @@ def _predicted(best: np.ndarray, weight: np.ndarray) -> np.ndarray:
     """
     price = np.float32(-np.log(SURPRISES[0]))
     gain = np.moveaxis(-best, 2, 0) - _FURTHER * weight
-    ahead, behind = np.zeros_like(gain), np.zeros_like(gain)
-    count = len(gain)
-    for step in range(1 - count, count):
-        ahead[step] = np.minimum(np.maximum(ahead[step - 1], -price), 0) + gain[step]
-        behind[-step - 1] = np.minimum(np.maximum(behind[-step] + gain[-step], 0), price)
+    # Ahead of an angle and, the other way round, behind it.
+    gains = np.stack([gain, gain[::-1]], axis=1)
+    low, high = (np.array(of, gain.dtype)[:, None, None] for of in ((-price, 0), (0, price)))
+    bounded = np.zeros_like(gains)
+    steps = list(zip(bounded, gains, strict=True))
+    path = np.stack([np.zeros_like(gain[0]), gain[-1]])
+    for of_step, of_gain in steps[1:] + steps:
+        np.maximum(path, low, out=of_step)
+        np.minimum(of_step, high, out=of_step)
+        np.add(of_step, of_gain, out=path)
+    ahead, behind = bounded[:, 0] + gain, bounded[::-1, 1]
     return np.moveaxis(ahead + behind <= 0, 0, 2)
 
 

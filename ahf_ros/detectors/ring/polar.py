@@ -11,7 +11,7 @@ from ahf_ros.features.array_record import ArrayRecord
 from ahf_ros.features.circle_fit import Fit
 from ahf_ros.features.normal import normal_integral
 from ahf_ros.features.profiles import USUAL_BLUR
-from ahf_ros.features.robust import NORMAL
+from ahf_ros.features.robust import NORMAL, medians
 from ahf_ros.features.sampling import sample_circles, within
 from ahf_ros.imaging.black import black_lift, lifted
 from ahf_ros.imaging.image import SATURATED
@@ -115,8 +115,10 @@ class PolarImages(ArrayRecord):
         place = np.clip((radii - _INNERMOST) / spacing, 0, self.gray.shape[2] - 1.001)
         below = place.astype(np.intp)
         share = (place - below).astype(np.float32)[..., None]
-        values: np.ndarray = self.gray[self.row, :, below] * (1 - share)
-        values += self.gray[self.row, :, below + 1] * share
+        values, beyond = (self.gray[self.row, :, circle] for circle in (below, below + 1))
+        values *= 1 - share
+        beyond *= share
+        values += beyond
         return values
 
     def inked(self, paper: np.ndarray, seen: np.ndarray) -> np.ndarray:
@@ -127,9 +129,11 @@ class PolarImages(ArrayRecord):
         polarity, contrast = (
             _along(of, paper).astype(np.float32) for of in (self.polarity, self.contrast)
         )
-        bright = paper / contrast
-        bright = np.where(seen >= SATURATED, np.minimum(bright, seen), bright)
-        return np.where(polarity > 0, contrast * paper, bright)
+        one = np.float32(1)
+        ink = paper * np.where(polarity > 0, contrast, one)
+        ink /= np.where(polarity > 0, one, contrast)
+        white = (seen >= SATURATED) & (polarity < 0)
+        return np.where(white, np.minimum(ink, seen), ink) if white.any() else ink
 
     def printed(self, paper: np.ndarray, share: np.ndarray, seen: np.ndarray) -> np.ndarray:
         """Return the gray values of paper of which a share is ink."""
@@ -154,6 +158,11 @@ class PolarImages(ArrayRecord):
         raised = np.maximum(values, 0) + np.float32(LOG_OFFSET)
         return np.log(raised), _along(self.noise, values).astype(np.float32) / raised
 
+    @staticmethod
+    def levels(values: np.ndarray) -> np.ndarray:
+        """Return ln(I + offset) of gray values."""
+        return np.asarray(np.log(np.maximum(values, 0) + np.float32(LOG_OFFSET)))
+
 
 def polar_images(
     gray: np.ndarray,
@@ -166,7 +175,8 @@ def polar_images(
     angles, (inner, outer) = angles_of(count), band
     outermost = outer + _MARGIN
     radii = np.linspace(_INNERMOST, outermost, circles)
-    values = np.maximum(sample_circles(gray, dots.frames, angles, radii), 0)
+    values = sample_circles(gray, dots.frames, angles, radii)
+    np.maximum(values, 0, out=values)
     contrast, lift = _appearance(gray, dots, band)
     values = lifted(values, lift.astype(np.float32)[:, None, None])
     places = [*(1 + (inner - 1) * GAP), *(outer + MARGIN)]
@@ -178,7 +188,8 @@ def polar_images(
     # A camera that sharpens darkens dark ground beside bright marks; nothing there is darker.
     shade = np.where(dots.polarity > 0, shade, np.float32(0))
     return PolarImages(
-        gray=values,
+        # Circle by circle in memory, as they are read.
+        gray=np.ascontiguousarray(values.swapaxes(1, 2)).swapaxes(1, 2),
         row=np.arange(len(values)),
         reach=_reach(gray.shape, dots.frames, angles, radii),
         outermost=np.full(len(values), outermost),
@@ -217,7 +228,7 @@ def _appearance(
     inside, outside, *beyond = np.moveaxis(np.maximum(values, _MINIMUM_LEVEL), 2, 0)
     deep, near = normal_integral((radius[:, None] - beside) * (dots.size / dots.blur)[:, None]).T
     by_levels, bare = (
-        _unmixed(np.median(inside / of, axis=1), deep, share) ** dots.polarity
+        _unmixed(medians(inside / of), deep, share) ** dots.polarity
         for of, share in ((outside, near), (np.mean(beyond, axis=0), 0.0))
     )
     contrast = np.maximum(dots.contrast, np.minimum(by_levels, _PRINTED))
@@ -239,13 +250,13 @@ def _later(gap: np.ndarray, apart: np.ndarray) -> np.ndarray:
     count = gap.shape[1]
     lags = np.clip(np.ceil(CORRELATION / np.maximum(apart, 1e-9)), 1, count // 4).astype(np.intp)
     later = (np.arange(count) + lags[:, None]) % count
-    return np.take_along_axis(gap, later[..., None], axis=1)
+    return np.asarray(gap[np.arange(len(gap))[:, None], later])
 
 
 def _noise(gap: np.ndarray, later: np.ndarray) -> np.ndarray:
     """Return the noise of gray values, from readings (k, m, 2) and later ones, shape (k,)."""
     change = np.abs(later - gap).reshape(len(gap), 2 * gap.shape[1])
-    usual = np.median(change, axis=1) * (NORMAL / np.sqrt(2))
+    usual = medians(change) * (NORMAL / np.sqrt(2))
     return np.clip(usual, *_NOISE)
 
 
@@ -259,8 +270,8 @@ def _usual_levels(
     """
     logs, of_later = (np.log(of + np.float32(LOG_OFFSET)) for of in (ground, later))
     values = logs.reshape(len(logs), logs.shape[1] * logs.shape[2])
-    usual = np.median(values, axis=1)
-    spread = np.median(np.abs(values - usual[:, None]), axis=1) * NORMAL
+    usual = medians(values)
+    spread = medians(np.abs(values - usual[:, None])) * NORMAL
     width = _UNLIKE * np.maximum(np.maximum(spread, _EVEN), noise / np.exp(usual))
     dark = logs < (usual - width)[:, None, None]
     darker = (dark[..., ::2] | dark[..., 1::2]).mean(axis=(1, 2))
@@ -285,6 +296,11 @@ def _reach(
     centres = frames[:, :2, 2] / frames[:, 2:, 2]
     inside = (centres > farthest) & (centres < np.array(shape[1::-1]) - 1 - farthest)
     border = np.flatnonzero(~inside.all(axis=1))
+    # The outermost circle is whole about most of them.
+    circles = frame.project(frames[border], frame.circle_points(angles, radii[-1:]))
+    whole = within(circles, shape).all(axis=(1, 2))
+    reach[border] = radii[-1]
+    border = border[~whole]
     points = frame.project(frames[border], frame.circle_points(angles, radii))
     reach[border] = np.where(within(points, shape), radii, 0).max(axis=2)
     return reach

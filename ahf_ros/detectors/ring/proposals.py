@@ -26,6 +26,7 @@ from ahf_ros.features.circle_fit import ENOUGH, NO_FITS, Fit, fit_dots
 from ahf_ros.features.dot_search import voted_dots, whole_dots
 from ahf_ros.features.dots import NO_DOTS, Dots
 from ahf_ros.features.pyramid import Octave
+from ahf_ros.features.robust import medians
 from ahf_ros.features.small_dots import small_dots_in
 
 _THIN = 4.0  # semi-minor axis of a dot whose gap edges of a half may not show, px
@@ -195,10 +196,11 @@ def _holes(polar: PolarImages, outer: np.ndarray) -> np.ndarray:
         return holes
     polar, outer = polar.select(bright), outer[bright]
     inside, outside = (
-        polar.logs(polar.at(radius).swapaxes(0, 1))[0]
+        polar.levels(polar.at(radius).swapaxes(0, 1))
         for radius in (DOT[:, None] * np.ones_like(outer), outer + MARGIN[:, None])
     )
-    alike = np.abs(outside - np.median(inside, axis=(1, 2), keepdims=True)) < _ALIKE
+    usual = medians(inside.reshape(len(outer), -1))[:, None, None]
+    alike = np.abs(outside - usual) < _ALIKE
     holes[bright] = (alike.mean(axis=2) > _BEYOND).all(axis=1)
     return holes
 

@@ -53,17 +53,28 @@ _SHIFTS = np.arange(-2.4, 2.41, 0.4)  # of edges, that are tried, px
 
 
 def read_bands(
-    gray: np.ndarray, dots: Fit, family: Family, prior: Prior = NOTHING_KNOWN
+    gray: np.ndarray,
+    dots: Fit,
+    family: Family,
+    prior: Prior = NOTHING_KNOWN,
+    least: np.ndarray | None = None,
 ) -> Hypotheses:
-    """Read the bands about dots, and refine dot and band together: one hypothesis of each dot."""
-    parts = [
-        _read_part(gray, dots.select(slice(start, start + PART)), family, prior)
-        for start in range(0, max(len(dots.frames), 1), PART)
-    ]
-    return Hypotheses.joined(parts)
+    """Read the bands about dots, and refine dot and band together: one hypothesis of each dot.
+
+    Words whose log odds against anything, see `Words.seen`, are not above `least`, shape (k,), are
+    not asked for: their dots may be left unread.
+    """
+    least = np.full(len(dots.frames), -np.inf) if least is None else least
+    starts = range(0, max(len(dots.frames), 1), PART)
+    parts = [slice(start, start + PART) for start in starts]
+    return Hypotheses.joined(
+        [_read_part(gray, dots.select(part), family, prior, least[part]) for part in parts]
+    )
 
 
-def _read_part(gray: np.ndarray, dots: Fit, family: Family, prior: Prior) -> Hypotheses:
+def _read_part(
+    gray: np.ndarray, dots: Fit, family: Family, prior: Prior, least: np.ndarray
+) -> Hypotheses:
     unread = Hypotheses.unread(dots, family)
     if not len(dots.frames):
         return unread
@@ -71,7 +82,7 @@ def _read_part(gray: np.ndarray, dots: Fit, family: Family, prior: Prior) -> Hyp
     polar = polar_images(gray, dots, family.band, family.bits * PER_SECTOR)
     growth = best_growth(polar, family.band, prior)
     edges = edge_evidence(polar, 1 - growth, growth, family.band, SHARES)
-    words = decode(edges, _overhang(growth, family), family, prior.expected)
+    words = decode(edges, _overhang(growth, family), family, prior.expected, looks=False)
     read = np.flatnonzero(_mean_odds(words, edges.weight) > hopeful)
     if not read.size:
         return unread
@@ -81,7 +92,7 @@ def _read_part(gray: np.ndarray, dots: Fit, family: Family, prior: Prior) -> Hyp
     # In the frame of the printed dot, the same growth is a larger share.
     some = polar.select(read), edges, words.select(read)
     growth = growth / (1 - growth)
-    words = _settled(gray, printed, *some, growth, family, prior.expected)
+    words = _settled(gray, printed, *some, growth, family, prior.expected, last=False)
     good = _mean_odds(words, edges.weight) > hopeful
     if not good.any():
         return unread
@@ -92,9 +103,18 @@ def _read_part(gray: np.ndarray, dots: Fit, family: Family, prior: Prior) -> Hyp
     growth = fit.polarity * fit.edge_shift / fit.size
     polar = polar_images(gray, fit, family.band, family.bits * PER_SECTOR)
     edges = edge_evidence(polar, np.ones(len(read)), growth, family.band, SHARES)
+    words = decode(edges, _overhang(growth, family), family, prior.expected)
+    # What is seen against anything is that of edges alone, whatever else there is.
+    enough = _of_reading(words.seen, words, edges.weight) > hopeful
+    asked = np.flatnonzero(enough & (words.seen > least[read]))
+    if not asked.size:
+        return unread
+    if asked.size < read.size:
+        read, growth = read[asked], growth[asked]
+        fit, polar = fit.select(asked), polar.select(asked)
+        edges, words = edges.select(asked), words.select(asked)
     overhang = _overhang(growth, family)
-    words = decode(edges, overhang, family, prior.expected)
-    words = _settled(gray, fit, polar, edges, words, growth, family, prior.expected)
+    words = _settled(gray, fit, polar, edges, words, growth, family, prior.expected, last=True)
     words = with_ends(polar, words, overhang, family)
     words = replace(words, unlike=unlike_print(polar, words, growth, overhang, family))
     good = _mean_odds(words, edges.weight) > hopeful
@@ -141,10 +161,13 @@ def _settled(
     growth: np.ndarray,
     family: Family,
     expected: frozenset[int],
+    *,
+    last: bool,
 ) -> Words:
     """Return the words of targets, by all evidence where edges alone leave a doubt.
 
     Targets are in the frames of their printed dots, the unit of the growth of their colour, (k,).
+    What else there is than words is looked at in the `last` reading only.
     """
     some = np.flatnonzero(_doubtful(words, edges))
     if not some.size:
@@ -162,7 +185,8 @@ def _settled(
     growth = growth[some]
     of_levels = level_evidence(polar, levels, *light, radii, growth, family.band, SHARES)
     evidence = edges.plus(of_levels)
-    of_all = decode(evidence, _overhang(growth, family), family, expected)
+    overhang = _overhang(growth, family)
+    of_all = decode(evidence, overhang, family, expected, arcs=last, looks=last)
     hidden = of_all.hidden | (polar.reach < of_band[0])
     # What speaks against no target is that of edges, so that all targets compare.
     of_edges = words.select(some)
@@ -189,7 +213,12 @@ def _by_dot(fit: Fit, printed: Fit, growth: np.ndarray, which: np.ndarray) -> Fi
 
 def _mean_odds(words: Words, weight: np.ndarray) -> np.ndarray:
     """Return the log odds of words against no target for a reading, shape (k,)."""
-    mean: np.ndarray = np.minimum(words.marked, words.seen) / (weight * words.hidden.shape[1])
+    return _of_reading(np.minimum(words.marked, words.seen), words, weight)
+
+
+def _of_reading(odds: np.ndarray, words: Words, weight: np.ndarray) -> np.ndarray:
+    """Return log odds of words, shape (k,), for a reading."""
+    mean: np.ndarray = odds / (weight * words.hidden.shape[1])
     return mean
 
 

@@ -68,9 +68,10 @@ def _beaten(
             asked = np.flatnonzero((ceiling > least) & ~beaten)
             if not asked.size:
                 continue
-            other, word = read_bands(gray, dots.select(asked), code, prior), words.select(asked)
-            more = other.seen > word.seen + _MORE_SEEN
-            beaten[asked[more & (odds(other) > odds(word))]] = True
+            word = words.select(asked)
+            needed = word.seen + _MORE_SEEN
+            other = read_bands(gray, dots.select(asked), code, prior, needed)
+            beaten[asked[(other.seen > needed) & (odds(other) > odds(word))]] = True
     return beaten
 
 
