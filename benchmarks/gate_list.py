@@ -42,7 +42,7 @@ def _without_shares(*rounds: int) -> str:
 
 def _confidence_without(feature: int) -> str:
     """Return the weights of the confidence of rings without that of one feature."""
-    return f'np.where(np.arange(8) == {feature}, 0.0, ORIGINAL)'
+    return f'np.where(np.arange(len(ORIGINAL)) == {feature}, 0.0, ORIGINAL)'
 
 
 _HALF_THE_VOTES = 'ORIGINAL._replace(votes=ORIGINAL.votes / 2)'
@@ -133,27 +133,20 @@ RING = [
         _confidence_without(2),
     ),
     Gate(
-        'confidence: edges in place',
+        'confidence: share of evidence',
         'detectors.ring.confidence:_OF_TARGET',
         _confidence_without(3),
     ),
-    Gate(
-        'confidence: share of evidence',
-        'detectors.ring.confidence:_OF_TARGET',
-        _confidence_without(4),
-    ),
-    Gate(
-        'confidence: ends of arcs', 'detectors.ring.confidence:_OF_TARGET', _confidence_without(5)
-    ),
+    Gate('confidence: bare paper', 'detectors.ring.confidence:_OF_TARGET', _confidence_without(4)),
     Gate(
         'confidence: spots of light',
         'detectors.ring.confidence:_OF_TARGET',
-        _confidence_without(6),
+        _confidence_without(5),
     ),
     Gate(
         'confidence: unlike its print',
         'detectors.ring.confidence:_OF_TARGET',
-        _confidence_without(7),
+        _confidence_without(6),
     ),
     Gate('low confidence', 'detectors.ring.hypotheses:CERTAIN', '0.05'),
     Gate(
