@@ -38,7 +38,7 @@ _PRIOR = 1.0  # inverse variance of scaled weights
 _ITERATIONS = 3000
 _NO_SPREAD = 1e-9
 _MINIMUM_MARGIN = np.log1p(2.0)  # of readings that count: others are not certain in any case
-_HIDDEN, _TRACE = 0.03, -2.2  # share of the band, and feature of arcs, without a trace of covers
+_HIDDEN, _TRACE = 0.03, -1.4  # share of the band, and feature of arcs, without a trace of covers
 
 
 def readings(seed: int) -> Parts:

@@ -28,8 +28,8 @@ WEIGHTS = Path(__file__).with_name('fitted_weights.json')
 
 _OF_TARGET = np.concatenate(read_weights(WEIGHTS, 'confidence', 'intercept', 'weights'))
 _LITTLE = 3.0  # log odds of a typical target, of which no share is asked for
-_NONE = 0.05  # share of the evidence of a typical target that counts as none
-_BARE = 30.0  # log odds against bare paper that leave a doubt
+_BARE = 30.0  # log odds of words against bare paper that leave a doubt
+_MANY = 0.4  # share of marks from which words have these odds, and fewer below it
 _OF_MARGIN = np.array([-1.0, 1.0])  # one or two log odds leave a doubt
 
 
@@ -37,23 +37,33 @@ def features(read: Hypotheses) -> np.ndarray:
     """Return what speaks for readings, float64, shape (k, 6).
 
     Logarithm of the log odds of words against the next ID; root of the log odds of arcs of ink of
-    any length against them, negative; logarithm of the share that is seen of the evidence of a
-    typical target of this size in this light; how easily bare paper shows the word, negative; how
-    easily spots of light show it, negative; the share of sectors that look like another print,
+    any length against them, negative; the share that is missing of the evidence of a typical
+    target of this size in this light, negative; how easily bare paper shows the word, negative;
+    how easily spots of light show it, negative; the share of sectors that look like another print,
     beyond what covers explain, negative.
     """
     seen = np.maximum(read.seen, 0) / np.maximum(read.typical, _LITTLE)
     return np.stack(
         [
             np.log1p(np.maximum(read.margin, 0)),
-            -np.sqrt(np.maximum(-read.coded, 0)),
-            np.log(np.clip(seen, _NONE, 1)),
-            -np.exp(-np.maximum(read.marked, 0) / _BARE),
+            1 - np.sqrt(1 + np.maximum(-read.coded, 0)),
+            np.clip(seen, 0, 1) - 1,
+            -np.exp(-np.maximum(read.marked, 0) / _of_bare_paper(read)),
             -np.exp(1 - _spots(read)),
             np.minimum(COVERED - read.unlike, 0),
         ],
         axis=1,
     )
+
+
+def _of_bare_paper(read: Hypotheses) -> np.ndarray:
+    """Return log odds against bare paper that leave a doubt, shape (k,), by words' marks."""
+    odds = np.full(len(read.words), _BARE)
+    for code in dict.fromkeys(read.families):
+        which = read.families == code
+        share = np.maximum(marks(read.words[which], code.bits), 1) / code.bits
+        odds[which] *= np.minimum(share / _MANY, 1)
+    return odds
 
 
 def _spots(read: Hypotheses) -> np.ndarray:

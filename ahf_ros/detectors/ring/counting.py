@@ -17,6 +17,7 @@ from ahf_ros.detectors.ring.confidence import features, target_probability
 from ahf_ros.detectors.ring.contests import on_targets
 from ahf_ros.detectors.ring.decoding import CLEAR
 from ahf_ros.detectors.ring.detector import find_hypotheses
+from ahf_ros.detectors.ring.hypotheses import CERTAIN
 from ahf_ros.features import frame
 from ahf_ros.imaging.image import as_gray, check_image
 
@@ -52,7 +53,7 @@ def estimate_count(image: np.ndarray, settings: DetectorSettings | None = None) 
     no_doubt = np.full(len(read.words), CLEAR)
     clear = replace(read, margin=no_doubt, coded=_OF_WORDS * read.coded)
     probability = np.where(read.words > 0, target_probability(features(clear)), 0.0)
-    counted = (probability > 0.5) & (major >= minimum) & (major <= maximum)
+    counted = (probability >= CERTAIN) & (major >= minimum) & (major <= maximum)
     order = np.argsort(-read.seen[counted], kind='stable')
     targets = read.select(np.flatnonzero(counted)[order])
     certain = np.ones(len(order), bool)
