@@ -73,7 +73,7 @@ def _below_right_ones(read: Hypotheses, right: np.ndarray) -> np.ndarray:
 
 
 def rising_regression(
-    features: np.ndarray, right: np.ndarray, counts: np.ndarray, most: np.ndarray
+    features: np.ndarray, right: np.ndarray, counts: np.ndarray, most: np.ndarray | float = np.inf
 ) -> tuple[float, np.ndarray]:
     """Return intercept and weights of a logistic regression, none of which is negative.
 
@@ -86,7 +86,7 @@ def rising_regression(
     right : ndarray of bool, shape (k,)
     counts : ndarray of float, shape (k,)
         How often each row counts.
-    most : ndarray of float, shape (n,)
+    most : ndarray of float, shape (n,), or float
         Largest weights.
     """
     mean, spread = features.mean(axis=0), features.std(axis=0) + _NO_SPREAD
