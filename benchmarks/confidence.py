@@ -31,7 +31,7 @@ COVERED = ('cover', 'cover like paper', 'another target')
 MARGIN, CODED = 0, 1
 """Places of some features."""
 
-MOST = np.array([np.inf, np.inf, np.inf, np.inf, 1.8, np.inf])
+MOST = np.array([np.inf, np.inf, np.inf, np.inf, np.inf, 2.5, np.inf])
 """Largest weights: words of one arc, which spots of light show as well, are read in even light."""
 
 RARE = 0.3

@@ -133,20 +133,25 @@ RING = [
         _confidence_without(2),
     ),
     Gate(
-        'confidence: share of evidence',
+        'confidence: edges in place',
         'detectors.ring.confidence:_OF_TARGET',
         _confidence_without(3),
     ),
-    Gate('confidence: bare paper', 'detectors.ring.confidence:_OF_TARGET', _confidence_without(4)),
+    Gate(
+        'confidence: share of evidence',
+        'detectors.ring.confidence:_OF_TARGET',
+        _confidence_without(4),
+    ),
+    Gate('confidence: bare paper', 'detectors.ring.confidence:_OF_TARGET', _confidence_without(5)),
     Gate(
         'confidence: spots of light',
         'detectors.ring.confidence:_OF_TARGET',
-        _confidence_without(5),
+        _confidence_without(6),
     ),
     Gate(
         'confidence: unlike its print',
         'detectors.ring.confidence:_OF_TARGET',
-        _confidence_without(6),
+        _confidence_without(7),
     ),
     Gate('low confidence', 'detectors.ring.hypotheses:CERTAIN', '0.05'),
     Gate(

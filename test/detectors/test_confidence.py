@@ -33,7 +33,7 @@ def test_confidence_is_a_probability_that_grows_with_the_evidence() -> None:
     assert weights.min() >= 0  # so that more evidence never makes it less sure
     assert ((sure > 0.9) & (sure <= 1)).all()
     assert np.array_equal(sure, found.confidence)
-    for name in ('margin', 'marked', 'seen', 'coded'):
+    for name in ('margin', 'marked', 'seen', 'coded', 'share'):
         values = getattr(found, name)
         less = confidence(features(replace(found, **{name: values - np.abs(values) / 2})))
         assert ((less >= 0) & (less <= sure)).all(), name

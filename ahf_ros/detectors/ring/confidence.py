@@ -34,19 +34,20 @@ _OF_MARGIN = np.array([-1.0, 1.0])  # one or two log odds leave a doubt
 
 
 def features(read: Hypotheses) -> np.ndarray:
-    """Return what speaks for readings, float64, shape (k, 6).
+    """Return what speaks for readings, float64, shape (k, 7).
 
     Logarithm of the log odds of words against the next ID; root of the log odds of arcs of ink of
-    any length against them, negative; the share that is missing of the evidence of a typical
-    target of this size in this light, negative; how easily bare paper shows the word, negative;
-    how easily spots of light show it, negative; the share of sectors that look like another print,
-    beyond what covers explain, negative.
+    any length against them, negative; the shares that are missing of the expected edges, and of the
+    evidence of a typical target of this size in this light, negative; how easily bare paper shows
+    the word, negative; how easily spots of light show it, negative; the share of sectors that look
+    like another print, beyond what covers explain, negative.
     """
     seen = np.maximum(read.seen, 0) / np.maximum(read.typical, _LITTLE)
     return np.stack(
         [
             np.log1p(np.maximum(read.margin, 0)),
             1 - np.sqrt(1 + np.maximum(-read.coded, 0)),
+            read.share - 1,
             np.clip(seen, 0, 1) - 1,
             -np.exp(-np.maximum(read.marked, 0) / _of_bare_paper(read)),
             -np.exp(1 - _spots(read)),
@@ -88,5 +89,5 @@ def confidence(values: np.ndarray) -> np.ndarray:
 
 
 def target_probability(values: np.ndarray) -> np.ndarray:
-    """Return the probabilities that readings are of targets, shape (k,), values (k, 6)."""
+    """Return the probabilities that readings are of targets, shape (k,), values (k, 7)."""
     return logistic(values, _OF_TARGET)
