@@ -25,7 +25,7 @@ from ahf_ros.target import UNDECODED, Identification, Target
 FIRST = 3
 """Images with targets in which all families are looked for."""
 
-_OF_ONE = 1.8  # decimal logarithm of the odds on a family: one target certain to 0.984
+_OF_ONE = 2.0  # decimal logarithm of the odds on a family: one target certain to 0.99
 _OF_SEVERAL = 3.9  # ... of all together: three certain to 0.95, or two to 0.989
 _OF_KNOWN = 1.99  # ... on families that other images have settled: one certain to 0.99
 _DOUBTFUL = 0.9  # confidence up to which words are read in nearly any texture

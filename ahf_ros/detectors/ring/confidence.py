@@ -37,10 +37,10 @@ def features(read: Hypotheses) -> np.ndarray:
     """Return what speaks for readings, float64, shape (k, 7).
 
     Logarithm of the log odds of words against the next ID; root of the log odds of arcs of ink of
-    any length against them, negative; the shares that are missing of the expected edges, and of the
-    evidence of a typical target of this size in this light, negative; how easily bare paper shows
-    the word, negative; how easily spots of light show it, negative; the share of sectors that look
-    like another print, beyond what covers explain, negative.
+    any length against them, negative; the shares that are missing of the expected edges, and of
+    the evidence of a typical target of this size in this light, negative; how easily bare paper
+    shows the word, negative; how easily spots of light show it, negative; the share of sectors
+    that look like another print, beyond what covers explain, negative.
     """
     seen = np.maximum(read.seen, 0) / np.maximum(read.typical, _LITTLE)
     return np.stack(

@@ -34,7 +34,7 @@ _SAME_PLACE = 0.3  # distance of two readings of one marker, in sides
 _FITTED = 4.0  # logarithmic odds against a marker whose print was laid: half its eight unknowns
 _SEVERAL = 4.0  # power of their number, one in which each of several groups is there
 _ALONE = 2.9  # ... one marker alone shows
-_OF_PLAIN = 4.0  # the most that a marker which letters look like shows, logarithmic odds
+_OF_PLAIN = 4.5  # the most that a marker which letters look like shows, logarithmic odds
 _LARGER = 6.9  # logarithmic odds against a larger dictionary where most markers are of a smaller
 _LARGE = 120.0  # side of a marker whose contour gives its corners to about two pixels, px
 
