@@ -66,10 +66,9 @@ def _below_right_ones(read: Hypotheses, right: np.ndarray) -> np.ndarray:
 
     These are not reported, whatever their confidence is.
     """
-    over = np.array([overlapping(read)(index) for index in range(len(right))]).reshape(
-        -1, len(right)
-    )
-    return np.asarray((over & right & (read.margin > read.margin[:, None])).any(axis=1))
+    over, margin = overlapping(read), read.margin
+    below = [(over(it) & right & (margin > margin[it])).any() for it in range(len(right))]
+    return np.array(below, bool)
 
 
 def rising_regression(
