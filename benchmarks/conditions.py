@@ -7,6 +7,7 @@ distances. Only the kinds are the same.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from functools import partial
 from itertools import product
 from pathlib import Path
@@ -129,21 +130,7 @@ def lit(seed: int) -> Iterator[SceneSettings]:
 
 def small(seed: int) -> Iterator[Scene]:
     """Yield scenes of small dots under all lights."""
-    generator = np.random.default_rng([seed, 8])
-    for light, ambient in product(LIGHT_NAMES, SHADES):
-        settings = SceneSettings(
-            width=WIDTH,
-            height=HEIGHT,
-            targets=36,
-            dot_radius=float(generator.uniform(*RADII_OF_SMALL)),
-            family=_any_family(generator),
-            polarity=str(generator.choice(['dark', 'dark', 'dark', 'bright'])),
-            blur=float(generator.uniform(0.6, 1.2)),
-            light=light,
-            light_scale=float(generator.choice([0.5, 0.8, 1.0])),
-            ambient=ambient,
-            seed=seed,
-        )
+    for settings in _small_dots(seed, 36, np.random.default_rng([seed, 8]), varied=True):
         rendering = render(settings)
         yield Scene('small', rendering.image, rendering.targets, settings.family)
 
@@ -173,18 +160,7 @@ def photographed(seed: int) -> Iterator[Scene]:
 def strange_in_light(seed: int) -> Iterator[Scene]:
     """Yield targets of other families under all lights, and clutter without any target."""
     generator = np.random.default_rng([seed, 10])
-    for light, ambient in product(LIGHT_NAMES, SHADES):
-        settings = SceneSettings(
-            width=WIDTH,
-            height=HEIGHT,
-            targets=24,
-            dot_radius=float(generator.uniform(*RADII_OF_SMALL)),
-            family=_any_family(generator),
-            light=light,
-            light_scale=float(generator.choice([0.5, 0.8, 1.0])),
-            ambient=ambient,
-            seed=seed,
-        )
+    for settings in _small_dots(seed, 24, generator):
         name = _other_print(settings.family, generator)
         yield Scene('other family', render(settings).image, (), name)
     for light in LIGHT_NAMES:
@@ -200,6 +176,28 @@ def strange_in_light(seed: int) -> Iterator[Scene]:
             seed=seed,
         )
         yield Scene('clutter', render(settings).image, (), _any_family(generator))
+
+
+def _small_dots(
+    seed: int, targets: int, generator: np.random.Generator, *, varied: bool = False
+) -> Iterator[SceneSettings]:
+    """Yield scenes of small dots under all lights, also of other colours and blurs if `varied`."""
+    for light, ambient in product(LIGHT_NAMES, SHADES):
+        settings = SceneSettings(
+            width=WIDTH,
+            height=HEIGHT,
+            targets=targets,
+            dot_radius=float(generator.uniform(*RADII_OF_SMALL)),
+            family=_any_family(generator),
+            light=light,
+            ambient=ambient,
+            seed=seed,
+        )
+        if varied:
+            polarity = str(generator.choice(['dark', 'dark', 'dark', 'bright']))
+            blur = float(generator.uniform(0.6, 1.2))
+            settings = replace(settings, polarity=polarity, blur=blur)
+        yield replace(settings, light_scale=float(generator.choice([0.5, 0.8, 1.0])))
 
 
 def _any_family(generator: np.random.Generator) -> str:

@@ -261,7 +261,7 @@ def test_over_exposed_targets_are_identified(light):
     assert np.abs(figures.errors).max() < 0.05
 
 
-@pytest.mark.parametrize(('levels', 'sharpened'), [((300, 45, 1.5), 0.0), ((230, 45, 1.0), 1.5)])
+@pytest.mark.parametrize(('levels', 'sharpened'), [((300, 45, 1.5), 0.0), ((230, 45, 1.0), 2.0)])
 def test_bright_marks_that_a_camera_clips_or_sharpens_are_read(levels, sharpened):
     of = sheet(bright=True)
     image = of.photograph(Exposure(levels=levels))

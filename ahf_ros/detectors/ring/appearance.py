@@ -61,10 +61,11 @@ def unlike_print(
     even = uneven.sum(axis=(1, 2)) < _UNEVEN * ground.sum(axis=(1, 2))
     of_dot = step[..., (radii < _INMOST).all(axis=0)].mean(axis=(1, 2))
     even &= np.abs(of_dot - 1) < _EVEN
-    lost = np.count_nonzero(ink & (step < _UNLIKE), axis=2) >= _READINGS
+    faded, stray = ink & (step < _UNLIKE), paper & (step > _EVEN)
+    lost = np.count_nonzero(faded, axis=2) >= _READINGS
     printed = np.maximum(np.count_nonzero(ink.any(axis=2), axis=1), 1)
     of_marks = np.count_nonzero(lost, axis=1) / printed
-    odd = (ink & (step < _UNLIKE)) | (paper & (step > _EVEN))
+    odd = faded | stray
     odd[..., 1:] &= odd[..., :-1]  # noise is of one reading
     told = inked | unmarked
     places = (phases[:, None] + np.arange(count)) % count

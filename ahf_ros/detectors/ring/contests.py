@@ -25,10 +25,10 @@ def among_others(hypotheses: Hypotheses) -> Hypotheses:
     """Return hypotheses of an image, less certain where it shows bands of no family that is read.
 
     Targets of one image share a family. Whole bands that arcs of any length explain better than
-    words, and targets that do not look like their print are foreign. Among
-    these a word is one by chance, unless more targets share its family and its colour, which most
-    targets of an image do; and it is arcs of any length, unless it explains its band better. What
-    is not certain among these speaks for no other word of its family.
+    words, and targets that do not look like their print are foreign. Among these a word is one by
+    chance, unless more targets share its family and its colour, which most targets of an image do;
+    and it is arcs of any length, unless it explains its band better. What is not certain among
+    these speaks for no other word of its family.
     """
     arcs = (hypotheses.coded < -_FOREIGN) & (hypotheses.share > _ROUND)
     arcs |= hypotheses.unlike > COVERED

@@ -303,10 +303,11 @@ def _step_evidence(
         densities += [normal(zero, spread), normal(zero, (low + high) / 2)]
         plain = normal(zero, spread), normal(mark, spread)
         anything += [_PLAIN * of + (1 - _PLAIN) * _ANY for of in plain]
-    doubts = [lit, lit, *[np.maximum(lit, np.float32(_AT_ENDS))] * len(shares), lit, lit]
+    doubts = [lit] * len(densities)
+    doubts[2 : 2 + len(shares)] = [np.maximum(lit, np.float32(_AT_ENDS))] * len(shares)
     odds = [
         np.log(((1 - doubt) * density + doubt * _ANY) / of)
-        for doubt, density, of in zip(doubts, densities, anything, strict=False)
+        for doubt, density, of in zip(doubts, densities, anything, strict=True)
     ]
     if shares:
         at_edge = lit * np.log(lit / (1 - _PLAIN))
