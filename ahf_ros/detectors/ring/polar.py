@@ -9,6 +9,7 @@ import numpy as np
 from ahf_ros.features import frame
 from ahf_ros.features.array_record import ArrayRecord
 from ahf_ros.features.circle_fit import Fit
+from ahf_ros.features.noise import reading_noise
 from ahf_ros.features.normal import normal_integral
 from ahf_ros.features.profiles import USUAL_BLUR
 from ahf_ros.features.robust import NORMAL, medians
@@ -183,7 +184,7 @@ def polar_images(
     ground = values[:, :, [np.abs(radii - place).argmin() for place in places]]
     apart = 2 * np.pi * inner * dots.size / count
     later = _later(ground, apart)
-    noise = _noise(ground[..., :2], later[..., :2])
+    noise = np.clip(reading_noise(gray, dots.frames, outermost), *_NOISE)
     shade, glare = _usual_levels(ground, later, noise)
     # A camera that sharpens darkens dark ground beside bright marks; nothing there is darker.
     shade = np.where(dots.polarity > 0, shade, np.float32(0))
@@ -251,13 +252,6 @@ def _later(gap: np.ndarray, apart: np.ndarray) -> np.ndarray:
     lags = np.clip(np.ceil(CORRELATION / np.maximum(apart, 1e-9)), 1, count // 4).astype(np.intp)
     later = (np.arange(count) + lags[:, None]) % count
     return np.asarray(gap[np.arange(len(gap))[:, None], later])
-
-
-def _noise(gap: np.ndarray, later: np.ndarray) -> np.ndarray:
-    """Return the noise of gray values, from readings (k, m, 2) and later ones, shape (k,)."""
-    change = np.abs(later - gap).reshape(len(gap), 2 * gap.shape[1])
-    usual = medians(change) * (NORMAL / np.sqrt(2))
-    return np.clip(usual, *_NOISE)
 
 
 def _usual_levels(
