@@ -31,9 +31,6 @@ COVERED = ('cover', 'cover like paper', 'another target')
 MARGIN, CODED = 0, 1
 """Places of some features."""
 
-MOST = np.array([np.inf, np.inf, np.inf, np.inf, np.inf, 2.5, np.inf])
-"""Largest weights: words of one arc, which spots of light show as well, are read in even light."""
-
 RARE = 0.3
 """Weight of a reading of a target under a condition that is not common, in the fit."""
 
@@ -72,7 +69,7 @@ def _below_right_ones(read: Hypotheses, right: np.ndarray) -> np.ndarray:
 
 
 def rising_regression(
-    features: np.ndarray, right: np.ndarray, counts: np.ndarray, most: np.ndarray | float = np.inf
+    features: np.ndarray, right: np.ndarray, counts: np.ndarray
 ) -> tuple[float, np.ndarray]:
     """Return intercept and weights of a logistic regression, none of which is negative.
 
@@ -85,8 +82,6 @@ def rising_regression(
     right : ndarray of bool, shape (k,)
     counts : ndarray of float, shape (k,)
         How often each row counts.
-    most : ndarray of float, shape (n,), or float
-        Largest weights.
     """
     mean, spread = features.mean(axis=0), features.std(axis=0) + _NO_SPREAD
     basis = np.column_stack([np.ones(len(features)), (features - mean) / spread])
@@ -98,7 +93,7 @@ def rising_regression(
         probability = 1 / (1 + np.exp(-np.clip(basis @ ahead, -30, 30)))
         gradient = basis.T @ (counts * (probability - right)) + prior * ahead
         after = ahead - gradient / steepest
-        after[1:] = np.clip(after[1:], 0, most * spread)
+        after[1:] = np.maximum(after[1:], 0)
         faster = (1 + np.sqrt(1 + 4 * momentum**2)) / 2
         ahead = after + (momentum - 1) / faster * (after - weights)
         weights, momentum = after, faster
@@ -114,7 +109,7 @@ def fitted(seeds: Sequence[int]) -> dict[str, np.ndarray]:
     no_trace &= values[:, CODED] > _TRACE
     told = (values[:, MARGIN] > _MINIMUM_MARGIN) & ~no_trace
     counts = np.where(np.isin(condition, COMMON + FOREIGN), 1.0, RARE)[told]
-    intercept, weights = rising_regression(values[told], right[told], counts, MOST)
+    intercept, weights = rising_regression(values[told], right[told], counts)
     return {'intercept': np.round([intercept], 3), 'weights': np.round(weights, 3)}
 
 

@@ -149,3 +149,11 @@ def mean_radii(frames: np.ndarray) -> np.ndarray:
 def local_affine(frames: np.ndarray) -> np.ndarray:
     """Return the derivatives of the frames' maps at the centre, shape (k, 2, 2), px a radius."""
     return frames[:, :2, :2] - frames[:, :2, 2:] * frames[:, 2:, :2]
+
+
+def root(squares: np.ndarray) -> np.ndarray:
+    """Return the symmetric square roots of positive symmetric matrices, shape (k, 2, 2)."""
+    product = np.sqrt(np.linalg.det(squares))[:, None, None]
+    trace = np.trace(squares, axis1=1, axis2=2)[:, None, None]
+    roots: np.ndarray = (squares + product * np.eye(2)) / np.sqrt(trace + 2 * product)
+    return roots

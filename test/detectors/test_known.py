@@ -14,6 +14,7 @@ from ahf_ros.detectors.external.guarded import guarded
 from ahf_ros.detectors.ring.hypotheses import Hypotheses
 from ahf_ros.detectors.ring.known import NOTHING_KNOWN, Explained, Prior
 from ahf_ros.evaluation import RIGHT, WRONG, judge
+from ahf_ros.features import frame
 from ahf_ros.target import Target
 from benchmarks import occluders
 from benchmarks.disturbances import far_apart
@@ -54,6 +55,40 @@ def test_the_shift_of_certain_targets_is_probably_that_of_the_others() -> None:
     apart = Prior.after(frozenset(), np.array([-1.5, -0.5, 0.4, 1.6]))
     assert apart.deviation == NOTHING_KNOWN.deviation
     assert apart.deviation > alike.deviation > 0  # not all are lit and printed alike
+
+
+def certain_ones(polarity: int = 1, count: int = 4) -> Explained:
+    """Return certain targets in a row, with dots of 10 px and 7 px, which have grown by 0.5 px."""
+    dots = made_up([100.0 * number for number in range(1, count + 1)])
+    stretched = frame.affine_frames(dots.frames[:, 0, 2], 50.0, 10.0, 7.0, 0.6)
+    shifts = np.full(count, 0.5)
+    dots = replace(
+        dots, frames=stretched, edge_shift=polarity * shifts, polarity=np.full(count, polarity)
+    )
+    return Explained.by(replace(Hypotheses.unread(dots, CODE), confidence=np.ones(count)))
+
+
+@pytest.mark.parametrize('polarity', [1, -1])
+@pytest.mark.parametrize('level', [0, 1])
+def test_a_dot_may_have_the_shape_of_the_targets_about_it(polarity: int, level: int) -> None:
+    others = replace(certain_ones(polarity), shifts=np.full(4, 0.5 * polarity))
+    seen = made_up([130.0, 230.0], radius=8.0 / 2**level)
+    dots = replace(seen, polarity=np.full(2, polarity))
+    alike = others.alike(dots, level)
+    assert np.array_equal(alike.frames[:, :, 2], dots.frames[:, :, 2])
+    grown = 1 + 0.5 / np.sqrt(70)
+    axes = np.array(frame.ellipse_axes(alike.frames))
+    assert pytest.approx(
+        np.tile([10 * grown / 2**level, 7 * grown / 2**level, 0.6], (2, 1)), rel=1e-6
+    ) == axes.T
+
+
+def test_dots_of_another_size_or_colour_have_their_own_shape() -> None:
+    others = certain_ones()
+    large, bright = made_up([130.0], radius=16.0), replace(made_up([130.0]), polarity=-np.ones(1))
+    assert not len(others.alike(large, 0).frames)
+    assert not len(others.alike(bright, 0).frames)
+    assert not len(certain_ones(count=2).alike(made_up([130.0], radius=8.0), 0).frames)
 
 
 IDS = far_apart(CODE, 3, 31)

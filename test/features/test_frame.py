@@ -71,3 +71,10 @@ def test_the_local_map_is_the_derivative_at_the_centre():
     ends = frame.project(OBLIQUE, step * np.array([[1.0, 0.0], [0.0, 1.0]]))[0]
     numeric = (ends - OBLIQUE[0, :2, 2]).T / step
     assert frame.local_affine(OBLIQUE)[0] == pytest.approx(numeric, rel=1e-4)
+
+
+def test_the_root_of_a_square_gives_the_ellipse_again():
+    square = frame.local_affine(OBLIQUE) @ frame.local_affine(OBLIQUE).transpose(0, 2, 1)
+    root = frame.root(square)
+    assert root @ root == pytest.approx(square)
+    assert root == pytest.approx(root.transpose(0, 2, 1))

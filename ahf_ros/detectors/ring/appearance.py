@@ -34,7 +34,7 @@ def unlike_print(
 
     Of a sector, the directions away from its borders count that differ at one radius, as circles
     of another print do and scratches do not. Where few are marked, a third of the share of these
-    counts. All are 0 where light is uneven.
+    counts. All are NaN where light is uneven, which tells nothing of print.
     `growth`, shape (k,), is that of ink in dot radii, and `overhang` by how many angles this makes
     arcs longer at either end.
     """
@@ -75,7 +75,7 @@ def unlike_print(
     at_radius = differ.reshape(*sectors, -1).sum(axis=2) / np.maximum(of_told, 1)[..., None]
     of_sectors = at_radius.max(axis=2)
     unlike = np.maximum(of_sectors.mean(axis=1), _OF_MARKS * of_marks)
-    return np.where(even, unlike, 0.0)
+    return np.where(even, unlike, np.nan)
 
 
 def _step_shares(polar: PolarImages, ground: np.ndarray) -> np.ndarray:

@@ -39,9 +39,10 @@ def features(read: Hypotheses) -> np.ndarray:
     Logarithm of the log odds of words against the next ID; root of the log odds of arcs of ink of
     any length against them, negative; the shares that are missing of the expected edges, and of
     the evidence of a typical target of this size in this light, negative; how easily bare paper
-    shows the word, negative; how easily spots of light show it, negative; the share of sectors
-    that look like another print, beyond what covers explain, negative.
+    shows the word, negative; how easily spots of light show it, where light is uneven, negative;
+    the share of sectors that look like another print, beyond what covers explain, negative.
     """
+    uneven = np.isnan(read.unlike)
     seen = np.maximum(read.seen, 0) / np.maximum(read.typical, _LITTLE)
     return np.stack(
         [
@@ -50,8 +51,8 @@ def features(read: Hypotheses) -> np.ndarray:
             read.share - 1,
             np.clip(seen, 0, 1) - 1,
             -np.exp(-np.maximum(read.marked, 0) / _of_bare_paper(read)),
-            -np.exp(1 - _spots(read)),
-            np.minimum(COVERED - read.unlike, 0),
+            -np.exp(1 - _spots(read)) * uneven,
+            np.where(uneven, 0, np.minimum(COVERED - read.unlike, 0)),
         ],
         axis=1,
     )

@@ -66,7 +66,8 @@ class Words(ArrayRecord):
     typical : ndarray of float64, shape (k,)
         The same as targets with this word have it on average, in light with as many edges.
     unlike : ndarray of float64, shape (k,)
-        Share of sectors in which targets are not what their words print, see `appearance`.
+        Share of sectors in which targets are not what their words print, see `appearance`; NaN
+        where light is uneven.
     hidden : ndarray of bool, shape (k, m)
         Where something covers the band.
     """

@@ -30,6 +30,7 @@ from ahf_ros.detectors.ring.learning import with_measured_bands
 from ahf_ros.detectors.ring.proposals import (
     PROPOSALS,
     Proposal,
+    measure_alike,
     measure_dots,
     measure_likely,
     propose_whole,
@@ -205,6 +206,8 @@ def read_pyramid(
             seen = _read(octave, images, likely, codes, seen, expected, every=every)
             fits.append(dots)
         measured.append((octave, Fit.joined(fits)))
+    for octave, dots in measured if shown else ():
+        seen = _read_alike(octave, images, dots, shown, seen, expected)
     for octave, dots in measured:
         part = octave.pyramid.gray
         while True:
@@ -260,6 +263,29 @@ def _read(
                 rest = NO_FITS
             left[index] = rest
     return seen
+
+
+def _read_alike(
+    octave: Octave,
+    images: Sequence[np.ndarray],
+    dots: Fit,
+    codes: Sequence[Family],
+    seen: _Seen,
+    expected: frozenset[int],
+) -> _Seen:
+    """Return what is seen once dots that show no target are read in the shape of targets.
+
+    Only what is certain is added: all else was read in the dots' own shape.
+    """
+    targets = seen.explained.select(seen.explained.certain)
+    rest = dots.select(~targets.on_them(dots.frames, octave.level))
+    alike = targets.alike(rest, octave.level)
+    if not len(alike.frames):
+        return seen
+    alike = measure_alike(octave.pyramid.gray, alike, codes)
+    again = _read(octave, images, alike, codes, seen, expected, every=False)
+    new = [read.select(read.certain) for read in again.found[len(seen.found) :]]
+    return seen.after(Hypotheses.joined(new)) if new else seen
 
 
 def report(

@@ -6,7 +6,7 @@ edges have shifted.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from ahf_ros.detectors.ring.circles import REACH
 from ahf_ros.detectors.ring.hypotheses import Hypotheses
 from ahf_ros.features import frame
 from ahf_ros.features.array_record import ArrayRecord
+from ahf_ros.features.circle_fit import NO_FITS, Fit
 from ahf_ros.features.robust import NORMAL
 
 WHOLE = 0.9
@@ -22,7 +23,9 @@ WHOLE = 0.9
 _AROUND = 0.25  # a whole dot without a word, where its own edge lies, dot radii
 _USUAL_DEVIATION = 1.0  # of the shift of edges of images, px
 _MINIMUM_DEVIATION = 0.3  # of targets of one image, which are not lit and printed alike, px
-_MINIMUM_TARGETS = 3  # certain targets that tell the shift of an image
+_MINIMUM_TARGETS = 3  # certain targets that tell the shift of an image, and the shape of others
+_NEAR = 5  # certain targets that tell the shape of one
+_OF_SIZE = 1.25  # ratio of the radii of dots that may be targets of one size
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,6 +40,8 @@ class Explained(ArrayRecord):
         Polygons around them and their margins, px of the image.
     sizes : ndarray of float64, shape (k,)
         Smaller radii of these, px.
+    polarity : ndarray of int, shape (k,)
+        1 for a dark target on bright ground, -1 for a bright one on dark.
     certain, clear : ndarray of bool, shape (k,)
         Whether they are targets, and of no other family than the one read.
     shifts : ndarray of float64, shape (k,)
@@ -46,6 +51,7 @@ class Explained(ArrayRecord):
     frames: np.ndarray
     outlines: np.ndarray
     sizes: np.ndarray
+    polarity: np.ndarray
     certain: np.ndarray
     clear: np.ndarray
     shifts: np.ndarray
@@ -60,7 +66,13 @@ class Explained(ArrayRecord):
         radii = np.where(certain, read.reach / minor + REACH, 1.0 + _AROUND)
         outlines = frame.circle_outlines(read.frames, radii)
         return Explained(
-            *(read.frames, outlines, radii * minor, certain, read.clear, read.edge_shift)
+            read.frames,
+            outlines,
+            radii * minor,
+            read.polarity,
+            certain,
+            read.clear,
+            read.edge_shift,
         )
 
     def on_them(self, frames: np.ndarray, level: int) -> np.ndarray:
@@ -69,6 +81,32 @@ class Explained(ArrayRecord):
         away = centres - self.frames[:, :2, 2]
         near = np.hypot(away[..., 0], away[..., 1]) < self.sizes
         return np.asarray(near.any(axis=1))
+
+    def alike(self, dots: Fit, level: int) -> Fit:
+        """Return dots with the shapes of the certain targets about them, where sizes agree.
+
+        Dots are px of the image that is halved `level` times. An edge of light that touches a dot
+        is taken for a part of its own and makes another ellipse of it; targets of one image that
+        are close to each other have much the same.
+        """
+        found = [NO_FITS]
+        for polarity in (1, -1):
+            known = self.select(self.certain & (self.polarity == polarity))
+            some = dots.select(dots.polarity == polarity)
+            if len(known.frames) < _MINIMUM_TARGETS or not len(some.frames):
+                continue
+            grown = 1 + polarity * known.shifts / frame.mean_radii(known.frames)
+            affine = frame.local_affine(frame.scaled(known.frames, grown)) / 2**level
+            centres = frame.enlarged(some.frames, level)[:, None, :2, 2]
+            away = np.hypot(*np.moveaxis(centres - known.frames[:, :2, 2], 2, 0))
+            near = np.argsort(away, axis=1, kind='stable')[:, :_NEAR]
+            squares = np.median((affine @ affine.transpose(0, 2, 1))[near], axis=1)
+            frames = some.frames.copy()
+            frames[:, :2, :2] = frame.root(squares)
+            ratio = frame.mean_radii(frames) / some.size
+            like = np.maximum(ratio, 1 / ratio) < _OF_SIZE
+            found.append(replace(some, frames=frames).select(like))
+        return Fit.joined(found)
 
     def outlines_in(self, level: int) -> np.ndarray:
         """Return the outlines with edges in the image that is halved `level` times, its px."""

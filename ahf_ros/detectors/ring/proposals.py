@@ -42,6 +42,9 @@ _ALIKE, _BEYOND = 0.15, 0.5  # difference of ln, and share of what is beyond, th
 HOPEFUL = 0.1
 """Bound of the mean evidence of a reading, from which a band is read."""
 
+ALIKE = 0.25
+"""The same of a dot in the shape of the targets about it, most of which have twice as much."""
+
 Print = tuple[tuple[float, float], int]
 """Radii of a band, in dot radii, and number of its sectors."""
 
@@ -113,6 +116,20 @@ def measure_likely(
     fit = Fit.joined([NO_FITS, *(_fit(gray, part) for part in parts)])
     order = np.argsort(-hope * fit.clearness**2, kind='stable')
     return fit.select(order[fit.share[order] >= ENOUGH]), others
+
+
+def measure_alike(gray: np.ndarray, dots: Fit, families: Sequence[Family]) -> Fit:
+    """Return the dots whose bands are worth reading in their shapes, the most hopeful ones first.
+
+    Each has its own centre, or that of its edges in this shape, whichever gives more hope.
+    """
+    moved = replace(dots, frames=dots.frames.copy())
+    moved.frames[:, :2, 2] = _fit(gray, dots, covariances=False).frames[:, :2, 2]
+    hope, of_moved = hopes(gray, dots, families), hopes(gray, moved, families)
+    dots = dots.replaced(np.flatnonzero(of_moved > hope), moved.select(of_moved > hope))
+    hope = np.maximum(hope, of_moved)
+    order = np.argsort(-hope * dots.clearness**2, kind='stable')
+    return dots.select(order[hope[order] > ALIKE])
 
 
 def _fit(gray: np.ndarray, dots: Dots | Fit, *, covariances: bool = True) -> Fit:
