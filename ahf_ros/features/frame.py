@@ -157,3 +157,14 @@ def root(squares: np.ndarray) -> np.ndarray:
     trace = np.trace(squares, axis1=1, axis2=2)[:, None, None]
     roots: np.ndarray = (squares + product * np.eye(2)) / np.sqrt(trace + 2 * product)
     return roots
+
+
+def shears(frames: np.ndarray, others: np.ndarray) -> np.ndarray:
+    """Return how dots differ from others in shape, not in size, (k, n), others (k, n, 3, 3).
+
+    It is the logarithm of the ratio of the axes of what circles of the others become here.
+    """
+    affine, of_others = local_affine(frames)[:, None], local_affine(others.reshape(-1, 3, 3))
+    across = np.linalg.solve(of_others.reshape(*others.shape[:2], 2, 2), affine)
+    stretched = np.linalg.svd(across, compute_uv=False)
+    return np.asarray(np.log(stretched[..., 0] / stretched[..., 1]))

@@ -18,6 +18,8 @@ _OTHER_COLOUR = 0.2  # of a foreign band, that a target of the other colour coun
 _ROUND = 0.6  # share of the edges of a word that are in their place, where there is a band
 _CODED = 5.0  # odds of words against arcs of any length, before any is read
 _OVERLAP = 0.92  # of the radii of two targets, at which the paper of one hides marks of the other
+_NEAR, _SHEAR = 5, 0.5  # certain targets beside one; ln of axes, by which all of them differ
+_ODD = 10.0  # odds against a target in another shape than those beside it
 _ON_TOP = 3.0  # times as sure of its word as of what lies below it
 
 
@@ -28,20 +30,28 @@ def among_others(hypotheses: Hypotheses) -> Hypotheses:
     words, and targets that do not look like their print are foreign. Among these a word is one by
     chance, unless more targets share its family and its colour, which most targets of an image do;
     and it is arcs of any length, unless it explains its band better. What is not certain among
-    these speaks for no other word of its family.
+    these speaks for no other word of its family. Targets that are close to each other have much
+    the same shape, which a word that is one by chance has not.
     """
     arcs = (hypotheses.coded < -_FOREIGN) & (hypotheses.share > _ROUND)
     arcs |= hypotheses.unlike > COVERED
+    odd = np.where(_odd(hypotheses), _ODD, 1.0)
     left = hypotheses
     while True:
-        among = replace(hypotheses, confidence=_among(hypotheses, left, arcs & ~left.certain))
+        confidence = _among(hypotheses, left, arcs & ~left.certain, odd)
+        among = replace(hypotheses, confidence=confidence)
         if np.array_equal(among.certain, left.certain):
             return among
         left = among
 
 
-def _among(hypotheses: Hypotheses, likely: Hypotheses, foreign: np.ndarray) -> np.ndarray:
-    """Return the confidence of hypotheses, by how likely each is and by foreign bands, (k,)."""
+def _among(
+    hypotheses: Hypotheses, likely: Hypotheses, foreign: np.ndarray, odd: np.ndarray
+) -> np.ndarray:
+    """Return the confidence of hypotheses, by how likely each is and by foreign bands, (k,).
+
+    `odd`, shape (k,), are the odds against their shapes.
+    """
     left = hypotheses.confidence.copy()
     evidence = likely.certain * likely.confidence
     kinds = [(code, sign) for code in dict.fromkeys(hypotheses.families) for sign in (1, -1)]
@@ -51,10 +61,23 @@ def _among(hypotheses: Hypotheses, likely: Hypotheses, foreign: np.ndarray) -> n
         sure, others = hypotheses.confidence[own], foreign[own].sum()
         unlike = _OTHER_COLOUR * evidence[of_family & ~own].sum()
         alike = evidence[own].sum() - evidence[own] + 0.5
-        by_chance = np.maximum((others + unlike + 0.5) / alike, 1)
+        by_chance = np.maximum((others + unlike + 0.5) / alike, 1) * odd[own]
         as_arcs = others / alike * np.exp(-np.maximum(hypotheses.coded[own], 0)) / _CODED
         left[own] = sure / (1 + (1 - sure) * (by_chance - 1) + sure * as_arcs)
     return left
+
+
+def _odd(hypotheses: Hypotheses) -> np.ndarray:
+    """Return whether certain hypotheses have another shape than all those beside, bool, (k,)."""
+    odd, certain = np.zeros(len(hypotheses.frames), bool), np.flatnonzero(hypotheses.certain)
+    if len(certain) <= _NEAR:
+        return odd
+    frames = hypotheses.frames[certain]
+    away = np.linalg.norm(frames[:, None, :2, 2] - frames[:, :2, 2], axis=2)
+    np.fill_diagonal(away, np.inf)
+    beside = np.argsort(away, axis=1, kind='stable')[:, :_NEAR]
+    odd[certain] = frame.shears(frames, frames[beside]).min(axis=1) > _SHEAR
+    return odd
 
 
 def resolve(hypotheses: Hypotheses, ids: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
