@@ -123,8 +123,10 @@ def measure_alike(gray: np.ndarray, dots: Fit, families: Sequence[Family]) -> Fi
 
     Each has its own centre, or that of its edges in this shape, whichever gives more hope.
     """
+    fit = _fit(gray, dots)
+    dots = replace(dots, covariance=fit.covariance)
     moved = replace(dots, frames=dots.frames.copy())
-    moved.frames[:, :2, 2] = _fit(gray, dots, covariances=False).frames[:, :2, 2]
+    moved.frames[:, :2, 2] = fit.frames[:, :2, 2]
     hope, of_moved = hopes(gray, dots, families), hopes(gray, moved, families)
     dots = dots.replaced(np.flatnonzero(of_moved > hope), moved.select(of_moved > hope))
     hope = np.maximum(hope, of_moved)
