@@ -7,13 +7,13 @@ and from the shape; so oblique dots are voted for with ellipses in several direc
 runs straight on for longer than a dot is wide belongs to no dot and does not vote, which silences
 projected stripes.
 
-Most votes are strays. So they are counted in blocks of cells first, and cell by cell only where
-blocks have enough. Votes for different things are counted in planes of their own.
+Most votes are strays. Those in blocks of cells that have few do not count, but only about cells
+that have enough this is looked at. Votes for different things are counted in planes of their own.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from math import ceil
 from typing import NamedTuple
@@ -60,12 +60,11 @@ _FLAT_PART = 0.75  # sine of the angle between an edge of an ellipse and its maj
 _REACH = 0.5  # within which no other centre has more votes, in radii of the smallest dot
 _CELL = 2  # in which the votes for different shapes are compared, px
 _LONG = 1.5  # length of an edge that is straight, in radii of the largest dot
-_SHIFT = 1
-_BLOCK = 1 << _SHIFT  # cells, side of a block
 _SPREAD = 1.4  # votes in a cell and beside it, in weighted votes, at the least
 _OWN = 1 / 8  # of the weighted votes of a peak, that its own cell has
 _WEIGHTS = (0.5, 1.0, 0.5)  # of votes for the cell before, for a cell itself, and the next one
-_MOST_VOTES = 2**24  # that are counted at a time, which bounds the memory
+_PART = 8192  # edges that vote, or cells that are looked at, at a time, which stay in the cache
+_MOST_CELLS = 2**24  # that are counted in at a time, which bounds the memory
 _FLAT = 1e-6  # curvature of votes from which their top is computed
 
 
@@ -161,17 +160,16 @@ def _peaks(
     margin = reach + ceil(high / of.cell) + 1  # votes may lie outside of the image
     tall, wide = (side // of.cell + 1 + 2 * margin for side in edges.marked.shape)
     directions = np.pi * np.arange(of.directions) / of.directions
-    at_once = max(1, _MOST_VOTES // (count * len(edges.x) // of.every))  # planes
+    at_once = max(1, _MOST_CELLS // (tall * wide))  # planes
     together = at_once >= len(polarities) * of.directions
     found = []
     for first, signs in enumerate([polarities] if together else [[it] for it in polarities]):
         for start in range(0, of.directions, at_once):
             # Votes for each polarity and direction are counted in a plane of their own.
             some = directions[start : start + at_once]
-            votes = _votes(edges, of, some, np.outer(signs, steps), margin, tall)
             shape = len(signs) * len(some), tall, wide
-            peaks = find_peaks(*votes, shape, needed / of.every, reach)
-            del votes  # before the next ones, of large images
+            votes = _votes(edges, of, some, np.outer(signs, steps), margin, shape)
+            peaks = find_peaks(votes, shape, needed / of.every, reach)
             found.append(replace(peaks, plane=first + peaks.plane // len(some)))
     peaks = Peaks.joined(found)
     x, y = ((at - margin + 0.5) * of.cell - 0.5 for at in (peaks.x, peaks.y))
@@ -184,28 +182,46 @@ def _votes(
     directions: np.ndarray,
     radii: np.ndarray,
     margin: int,
-    tall: int,
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return the columns and rows of the cells that edges vote for, int32, shape (n,) both.
+    shape: tuple[int, int, int],
+) -> Iterator[np.ndarray]:
+    """Yield the cells that edges vote for, as `cells_along` does.
 
-    Radii of shape (k, n) are signed, to vote for k polarities, with ellipses in some directions.
-    A plane has `tall` rows, with a margin of so many cells about the image.
+    Radii of shape (k, n) are signed, to vote for k polarities, with ellipses in some directions,
+    in planes of a shape, with a margin of so many cells about the image.
     """
-    columns, rows = [], []
-    cell = np.float32(of.cell)
     some = edges.select(slice(None, None, of.every))
-    x, y = ((at + np.float32(0.5)) / cell + np.float32(margin) for at in (some.x, some.y))
-    steps = (radii / of.cell).astype(np.float32)[..., None]
+    x, y = ((at + np.float32(0.5)) / np.float32(of.cell) + margin for at in (some.x, some.y))
+    steps = (radii / -of.cell).astype(np.float32)
+    _, tall, wide = shape
+    polarity = np.arange(len(steps)).repeat(steps.shape[1])
     for number, angle in enumerate(directions):
         start_x, start_y, unit_x, unit_y = x, y, some.unit_x, some.unit_y
         if of.aspect < 1:
             which, unit_x, unit_y = _towards_centres(some, of.aspect, angle)
             start_x, start_y = x[which], y[which]
-        for polarity, moves in enumerate(steps):
-            top = np.int32((polarity * len(directions) + number) * tall)
-            columns.append((start_x - moves * unit_x).astype(np.int32).ravel())
-            rows.append((start_y - moves * unit_y).astype(np.int32).ravel() + top)
-    return np.concatenate(columns), np.concatenate(rows)
+        planes = (polarity * len(directions) + number) * (tall * wide)
+        for cells in cells_along(start_x, start_y, unit_x, unit_y, steps.ravel(), wide):
+            yield cells + planes[:, None]
+
+
+def cells_along(
+    x: np.ndarray,
+    y: np.ndarray,
+    unit_x: np.ndarray,
+    unit_y: np.ndarray,
+    steps: np.ndarray,
+    wide: int,
+) -> Iterator[np.ndarray]:
+    """Yield the cells at n steps from k points along their directions, some points at a time.
+
+    They are indices, (n, m), into rows of so many cells; none is before the first of its row.
+    """
+    steps = steps[:, None]
+    for start in range(0, len(x), _PART):
+        part = slice(start, start + _PART)
+        columns = (x[part] + steps * unit_x[part]).astype(np.int32)
+        rows = (y[part] + steps * unit_y[part]).astype(np.intp)
+        yield rows * wide + columns
 
 
 def _towards_centres(
@@ -242,26 +258,27 @@ _NO_PEAKS = Peaks(_NONE, _NONE, _NONE.astype(int), _NONE)
 
 
 def find_peaks(
-    columns: np.ndarray,
-    rows: np.ndarray,
+    voted_for: Iterable[np.ndarray],
     shape: tuple[int, int, int],
     needed: float,
     reach: int,
 ) -> Peaks:
     """Return the cells with enough votes in them and beside them, and none with more within reach.
 
-    The cells voted for, int32, have rows that count through all planes. The shape is the number
-    of planes, and of rows and columns of each; nobody votes for those within `reach` cells of its
-    border. Of the votes needed, one for a neighbouring cell counts half, and a quarter on the
-    diagonal.
+    The cells voted for are indices into all planes. The shape is the number of planes, and of rows
+    and columns of each; nobody votes for those within `reach` cells of its border. Of the votes
+    needed, one for a neighbouring cell counts half, and a quarter on the diagonal.
     """
     planes, tall, wide = shape
-    which = _promising(columns, rows, (planes * tall, wide), needed)
-    if not len(which):
-        return _NO_PEAKS
     votes = np.zeros(planes * tall * wide, np.uint16)
-    np.add.at(votes, rows[which] * np.int32(wide) + columns[which], np.uint16(1))
+    for some in voted_for:
+        np.add.at(votes, some.ravel(), np.uint16(1))
     cells = np.flatnonzero(votes > np.uint16(_OWN * needed))
+    cells = cells[_weighted(votes, cells, wide) > needed]
+    if not len(cells):
+        return _NO_PEAKS
+    _clear_sparse_blocks(votes, cells, wide, needed)
+    cells = cells[votes[cells] > 0]
     sums = _weighted(votes, cells, wide)
     enough = sums > needed
     cells, sums = cells[enough], sums[enough]
@@ -284,29 +301,39 @@ def highest(
     field = np.zeros(shape[0] * shape[1], np.float32)
     values = values.astype(np.float32)
     np.maximum.at(field, cells, values)
-    free = np.ones(len(cells), bool)
+    which = np.arange(len(cells))
     for down in range(-reach, reach + 1):
         for across in range(-reach, reach + 1):
-            free &= values >= field.take(cells + (down * shape[1] + across), mode='clip')
+            beside = field.take(cells[which] + (down * shape[1] + across), mode='clip')
+            which = which[values[which] >= beside]
+    free = np.zeros(len(cells), bool)
+    free[which] = True
     return free
 
 
-def _promising(
-    columns: np.ndarray, rows: np.ndarray, shape: tuple[int, int], needed: float
-) -> np.ndarray:
-    """Return the indices of the votes in blocks that, with some neighbours, have enough."""
-    tall, wide = (-(-side // _BLOCK) for side in shape)
-    block = (rows >> _SHIFT) * np.int32(wide) + (columns >> _SHIFT)
-    of_blocks = np.zeros((tall, wide), np.uint16)
-    np.add.at(of_blocks.ravel(), block, np.uint16(1))
-    # A cell and its neighbours lie in two by two blocks.
-    of_blocks[1:] += of_blocks[:-1]
-    of_blocks[:, 1:] += of_blocks[:, :-1]
-    enough = of_blocks > np.uint16(_SPREAD * needed)
-    if not enough.any():
-        return np.zeros(0, np.intp)
-    hot = cv2.dilate(enough.view(np.uint8), np.ones((2, 2), np.uint8), anchor=(0, 0))
-    return np.flatnonzero(hot.view(bool).ravel().take(block))
+def _clear_sparse_blocks(votes: np.ndarray, cells: np.ndarray, wide: int, needed: float) -> None:
+    """Set the votes about cells to 0 in blocks that, with some neighbours, have few.
+
+    A block has two by two cells. A cell and its neighbours lie in two by two blocks.
+    """
+    sparse = []
+    side = np.arange(-4, 6)  # of five blocks
+    for start in range(0, len(cells), _PART):
+        row, column = np.divmod(cells[start : start + _PART, None, None], wide)
+        about = ((row & -2) + side[:, None]) * wide + (column & -2) + side
+        about = about.clip(0, len(votes) - 1)
+        of_blocks = votes[about].reshape(-1, 5, 2, 5, 2).sum(axis=(2, 4))
+        enough = _of_four(np.add, of_blocks) > int(_SPREAD * needed)
+        whole = _of_four(np.logical_or, enough).repeat(2, axis=1).repeat(2, axis=2)
+        sparse.append(about[:, 2:-2, 2:-2][~whole])
+    votes[np.concatenate(sparse)] = 0
+
+
+def _of_four(joined: np.ufunc, values: np.ndarray) -> np.ndarray:
+    """Return what joins two by two neighbours in arrays of values, (k, m, n), (k, m-1, n-1)."""
+    rows = joined(values[:, 1:], values[:, :-1])
+    of_four: np.ndarray = joined(rows[:, :, 1:], rows[:, :, :-1])
+    return of_four
 
 
 def _weighted(votes: np.ndarray, cells: np.ndarray, wide: int) -> np.ndarray:

@@ -29,14 +29,13 @@ def measured(outlines: Sequence[np.ndarray]) -> tuple[np.ndarray, np.ndarray, np
     >>> measured([np.array([[[0, 0]], [[4, 0]], [[4, 3]]], np.int32)])
     (array([6.]), array([12.]), array([[5, 4]], dtype=int32))
     """
-    points = points_of(outlines)
+    x, y = points = np.ascontiguousarray(points_of(outlines).T)
     counts = np.array([*map(len, outlines)], int)
     first = np.cumsum(counts) - counts
-    following = np.arange(1, len(points) + 1)
-    following[first + counts - 1] = first
-    after = points[following]
-    doubled = points[:, 0] * after[:, 1] - points[:, 1] * after[:, 0]
-    areas = np.add.reduceat(doubled, first, dtype=np.float64) / 2
-    lengths = np.add.reduceat(np.hypot(*(after - points).T), first)
-    boxes = np.maximum.reduceat(points, first) - np.minimum.reduceat(points, first) + 1
+    after = np.roll(points, -1, axis=1)
+    after[:, first + counts - 1] = points[:, first]
+    areas = np.add.reduceat(x * after[1] - y * after[0], first, dtype=np.float64) / 2
+    lengths = np.add.reduceat(np.hypot(*(after - points)), first)
+    boxes = np.maximum.reduceat(points, first, axis=1) - np.minimum.reduceat(points, first, axis=1)
+    boxes = boxes.T + 1
     return areas, lengths, boxes

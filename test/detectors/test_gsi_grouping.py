@@ -17,7 +17,7 @@ def test_the_map_knows_the_nearest_of_dots_that_are_apart() -> None:
     centres = np.stack([x.ravel(), y.ravel()], axis=1) + generator.uniform(-9, 9, (63, 2)) + 500
     nearest = nearest_dots(centres, 0.0)
     places = centres + generator.uniform(-5, 5, centres.shape)
-    found, distance = nearest(places, np.tile(2 * np.eye(2), (63, 1, 1)), 4.0)
+    found, distance = nearest(places, np.tile(np.eye(2) / 2, (63, 1, 1)), 4.0)
     assert found.tolist() == list(range(63))
     assert np.allclose(distance, np.hypot(*(places - centres).T) / 2)
 

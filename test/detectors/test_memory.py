@@ -28,7 +28,7 @@ def peak_of(work) -> int:
 
 def test_an_image_with_16_bits_takes_24_bytes_a_pixel(monkeypatch: pytest.MonkeyPatch) -> None:
     # Parts as small beside this image as they are beside one of 100 MP.
-    for module, name in ((candidates, '_MOST_VOTES'), (small_dots, '_STRIP')):
+    for module, name in ((candidates, '_MOST_CELLS'), (small_dots, '_STRIP')):
         monkeypatch.setattr(module, name, getattr(module, name) // 32)
     shown = rendering(width=2000, height=1500, targets=4, light='stripe', ambient=0.3, seed=5)
     image = shown.image.astype(np.uint16) * 200

@@ -78,32 +78,30 @@ def test_many_bright_spots_do_not_crowd_out_dark_dots(monkeypatch):
         assert kept == [min(count, 2) for count in counts]
 
 
-def votes_about(x: float, y: float, plane: int, count: int) -> tuple[np.ndarray, np.ndarray]:
+def votes_about(x: float, y: float, plane: int, count: int) -> np.ndarray:
     """Return the cells that votes scattered about a point are for."""
     scatter = np.random.default_rng(3).normal(0, 0.7, (2, count))
-    columns, rows = np.rint(np.array([[x], [y]]) + scatter).astype(np.int32)
-    return columns, rows + np.int32(plane * SHAPE[1])
+    columns, rows = np.rint(np.array([[x], [y]]) + scatter).astype(int)
+    return (plane * SHAPE[1] + rows) * SHAPE[2] + columns
 
 
 @pytest.mark.parametrize('plane', [0, 1])
 @pytest.mark.parametrize('x', [20.0, 20.3, 20.5, 20.8])
 def test_a_peak_lies_between_cells(plane, x):
-    peaks = find_peaks(*votes_about(x, 15.4, plane, 400), SHAPE, 100, 2)
+    peaks = find_peaks([votes_about(x, 15.4, plane, 400)], SHAPE, 100, 2)
     assert peaks.plane.tolist() == [plane]
     assert (peaks.x[0], peaks.y[0]) == pytest.approx((x, 15.4), abs=0.15)
     assert peaks.votes[0] > 1
 
 
 def test_too_few_votes_make_no_peak():
-    assert len(find_peaks(*votes_about(20, 15, 0, 60), SHAPE, 100, 2).x) == 0
-    none = np.zeros(0, np.int32)
-    assert len(find_peaks(none, none, SHAPE, 100, 2).x) == 0
+    assert len(find_peaks([votes_about(20, 15, 0, 60)], SHAPE, 100, 2).x) == 0
+    assert len(find_peaks([], SHAPE, 100, 2).x) == 0
 
 
 def test_peaks_of_two_planes_do_not_touch():
     parts = [votes_about(20, 37, 0, 300), votes_about(20, 2, 1, 400)]
-    columns, rows = (np.concatenate(of) for of in zip(*parts, strict=True))
-    peaks = find_peaks(columns, rows, SHAPE, 100, 2)
+    peaks = find_peaks(parts, SHAPE, 100, 2)
     assert sorted(peaks.plane.tolist()) == [0, 1]
 
 
@@ -116,7 +114,7 @@ def test_votes_of_large_images_are_counted_in_parts(monkeypatch: pytest.MonkeyPa
     dots = [(80.0, 80.0, 12.0), (200.0, 90.0, 20.0, 9.0, 0.5), (120.0, 180.0, 5.0)]
     gray = in_stripes(drawn(dots), 31, 0.4)
     whole = voted(gray, (1, -1))
-    monkeypatch.setattr(candidates, '_MOST_VOTES', 1)
+    monkeypatch.setattr(candidates, '_MOST_CELLS', 1)
     parts = voted(gray, (1, -1))
     for one, other in zip(whole, parts, strict=True):
         assert np.array_equal(np.sort(one, axis=0), np.sort(other, axis=0))

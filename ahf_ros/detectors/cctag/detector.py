@@ -35,7 +35,7 @@ from ahf_ros.detectors.cctag.rings import (
 from ahf_ros.detectors.claims import best_targets
 from ahf_ros.detectors.contract import FamilyDetector, moved_targets
 from ahf_ros.features import frame
-from ahf_ros.features.candidates import find_peaks
+from ahf_ros.features.candidates import cells_along, find_peaks
 from ahf_ros.features.dot_search import voted_dots, whole_dots
 from ahf_ros.features.dots import Dots
 from ahf_ros.features.ellipse_targets import ellipse_fields, targets_from_frames
@@ -425,12 +425,12 @@ def _common_centres(octave: Octave) -> list[tuple[Dots, float]]:
         weakest = np.partition(edges.strength, -most)[-most]
         edges = edges.select(edges.strength >= weakest)
     steps = np.arange(1, _FACING, dtype=np.float32)
-    steps = np.concatenate([-steps, steps])[:, None]
+    steps = np.concatenate([-steps, steps])
     margin = int(high) + 2
-    columns = (edges.x + np.float32(margin + 0.5) + steps * edges.unit_x).astype(np.int32).ravel()
-    rows = (edges.y + np.float32(margin + 0.5) + steps * edges.unit_y).astype(np.int32).ravel()
     tall, wide = (side + 2 * margin for side in edges.marked.shape)
-    peaks = find_peaks(columns, rows, (1, tall, wide), 2 * np.pi * low, int(low / 2))
+    x, y = (of + (margin + 0.5) for of in (edges.x, edges.y))
+    votes = cells_along(x, y, edges.unit_x, edges.unit_y, steps, wide)
+    peaks = find_peaks(votes, (1, tall, wide), 2 * np.pi * low, int(low / 2))
     x, y = (of - margin for of in (peaks.x, peaks.y))
     size = np.full(len(x), low)
     frames = frame.affine_frames(x, y, size, size, np.zeros(len(x)))

@@ -22,7 +22,6 @@ from ahf_ros.detectors.cctag.templates import (
     by_value,
     discs,
     less_lines,
-    shares_of,
     size_steps,
     templates,
 )
@@ -45,6 +44,7 @@ _OF_DISCS = 0.9  # of 1, so that of rings in one place those that leave least ar
 _LOOKED_AT = 2  # frames for an ID, at the most
 _APART = 0.1  # distance of the centres of different frames, radii
 _LEAST_UNLIKE = 1e-6  # of squares of gray values, of their mean
+_LEAST_TOTAL = 1e-9  # of squares of a weighted profile
 _READ = 128  # circles that are read at a time
 _PART = 4096  # circles that are looked at at a time, which bounds the memory
 LARGEST = 1 / 0.15
@@ -166,11 +166,12 @@ def _better(
     """
     of_rings, of_any_disc = _templates(family, size, edges)
     better = np.zeros(len(profiles))
-    share = shares_of(profiles, of_rings, most=0).max(axis=1)
+    total = np.maximum((profiles**2).sum(axis=1), np.float32(_LEAST_TOTAL))
+    share = np.minimum((profiles @ of_rings.T).min(axis=1), 0) ** 2 / total  # ink is dark
     likely = np.flatnonzero(share >= _PROMISING)
     if not len(likely):
         return better
-    of_discs = shares_of(profiles[likely], of_any_disc).max(axis=1)
+    of_discs = np.abs(profiles[likely] @ of_any_disc.T).max(axis=1) ** 2 / total[likely]
     less = _OF_DISCS * np.log1p(-of_discs) - np.log1p(-share[likely])
     better[likely] = np.where(share[likely] > of_discs, less, 0)
     return better

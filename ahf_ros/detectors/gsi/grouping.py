@@ -53,10 +53,10 @@ _CELL = 2.0  # smallest one of the map of the nearest dots, px
 
 
 Nearest = Callable[[np.ndarray, np.ndarray, float], tuple[np.ndarray, np.ndarray]]
-"""From places, shape (n, 2), units and a reach to the nearest dots and their distances.
+"""From places, shape (n, 2), maps and a reach to the nearest dots and their distances.
 
-Units, shape (n, 2, 2), are the maps from the unit of the reach to px at each place. Beyond the
-reach a dot is -1.
+Maps, shape (n, 2, 2), are those from px to the unit of the reach at each place. Beyond the reach a
+dot is -1.
 """
 
 
@@ -132,18 +132,19 @@ def neighbours(
     crowd = round(_CROWD[obvious] * circles * (len(places) + family.rule.dots))
     centres = dots.frames[:, :2, 2]
     major = frame.ellipse_axes(dots.frames)[0]
+    size = np.log(major)
     inverse = np.linalg.inv(dots.frames[:, :2, :2])
+    unit_x, unit_y = (inverse[:, 0] - 1j * inverse[:, 1]).T
     widest = np.log(family.template_radii.max() / family.template_radii.min())
     limit = np.full(len(centres), np.inf)
     parts = [(np.zeros(0, int), np.zeros(0, int), np.zeros(0, complex))]
     for reach in np.geomspace(nearest, farthest, _STEPS):
         alone = np.isinf(limit)
         for first, second in pairs_within(centres, np.where(alone, reach * major, 0.0), _PART):
-            near = np.abs(np.log(major[second] / major[first])) < _SIZE_RATIO + widest
+            near = np.abs(size[second] - size[first]) < _SIZE_RATIO + widest
             first, second = first[near], second[near]
-            difference = centres[second] - centres[first]
-            across, down = (inverse[first] @ difference[..., None])[..., 0].T
-            offset = across - 1j * down
+            across, down = (of[second] - of[first] for of in centres.T)
+            offset = unit_x[first] * across + unit_y[first] * down
             length = np.abs(offset) / (2 * reach)
             near = np.flatnonzero(length < 0.5)
             order = near[np.argsort(first[near] + length[near])]
@@ -180,10 +181,10 @@ def nearest_dots(centres: np.ndarray, error: float) -> Nearest:
     dot[labels[cells[:, 1], cells[:, 0]]] = np.arange(len(cells))
     nearest = dot[labels]
 
-    def find(places: np.ndarray, units: np.ndarray, reach: float) -> tuple[np.ndarray, np.ndarray]:
+    def find(places: np.ndarray, maps: np.ndarray, reach: float) -> tuple[np.ndarray, np.ndarray]:
         column, row = np.clip(np.rint((places - corner) / cell), 0, last).astype(int).T
         found = nearest[row, column]
-        gap = np.linalg.inv(units) @ (centres[found] - places)[..., None]
+        gap = maps @ (centres[found] - places)[..., None]
         distance = np.hypot(gap[:, 0, 0], gap[:, 1, 0])
         return np.where(distance < reach, found, -1), distance
 
@@ -302,12 +303,12 @@ def _members(
         if not good.any():
             continue
         members, affine = members[good], affine[good]
-        origin = dots.frames[members[:, role], :2, 2]
+        origin, inverse = dots.frames[members[:, role], :2, 2], np.linalg.inv(affine)
         error = np.zeros(len(members))
         for index in np.setdiff1d(np.arange(len(places)), (role, partner, third)):
             expected = origin + affine @ arms[index]
             reach = _PREDICTED + _PERSPECTIVE * lengths[index]
-            members[:, index], gap = nearest()(expected, affine, reach)
+            members[:, index], gap = nearest()(expected, inverse, reach)
             error += np.where(members[:, index] < 0, 1, (gap / reach) ** 2)
         members[(members < 0).sum(axis=1) > 1] = -1
         kept = np.argsort(error, kind='stable')[:_MAXIMUM_GROUPS]
@@ -411,7 +412,7 @@ def _mostly_empty(templates: Templates, nearest: Nearest, family: PointFamily) -
     count = len(family.template)
     frames = local_frames(templates.homographies, family.places[count:], family.radii[count:])
     single = frames.reshape(-1, 3, 3)
-    found, _ = nearest(single[:, :2, 2], single[:, :2, :2], 1.0)
+    found, _ = nearest(single[:, :2, 2], np.linalg.inv(single[:, :2, :2]), 1.0)
     found = np.sort(found.reshape(frames.shape[:2]), axis=1)
     different = (np.diff(found, axis=1, prepend=-1) > 0).sum(axis=1)
     empty: np.ndarray = different <= family.rule.dots + _STRAY

@@ -89,7 +89,8 @@ def read(gray: np.ndarray, corners: np.ndarray, groups: Sequence[Sequence[str]])
             if (cells, border) not in grids[index] or not len(which):
                 continue
             prints, prior, plain = _table(tuple(group))
-            odds = evidence @ prints - prior
+            odds = evidence @ prints
+            odds -= prior
             best = odds.argmax(axis=1)
             total = odds[np.arange(len(best)), best] + against - _DOUBT - plain[best]
             likely = np.flatnonzero(total > _POSSIBLE)
