@@ -2,10 +2,12 @@
 
 This is the identification "TI" that the paper [1]_ uses beside Agisoft Metashape: an adaptive
 threshold, contours with the perimeter and roundness of a dot, a least-squares ellipse, and
-the coded band read by its grey gradient in the affine frame of that ellipse. It has no defence
-against uneven light, which makes it a fair test of a filter.
+the coded band read by its grey gradient in the affine frame of that ellipse. Its contours have no
+defence against uneven light, which makes it a fair test of a filter.
 
-Beyond the paper, the edges of dot and band are measured at sub-pixel accuracy, and together give
+Beyond the paper, the ellipse of a dot is measured at sub-pixel accuracy before the band is read,
+because the contour of a dot of 10 px in a filtered image is off by a tenth of its radius. The band
+is read by a level of the target's own. The edges of dot and band together give
 the image of the physical centre of a decoded target. The centre of an undecoded one is the centre
 of its ellipse, with the perspective bias in it (0.03 px for a dot of 20 px radius at 45 degrees).
 
@@ -36,7 +38,7 @@ from ahf_ros.features.frame import affine_frames, circle_points, ellipse_axes, p
 from ahf_ros.features.outlines import measured
 from ahf_ros.features.sampling import sample, within
 from ahf_ros.imaging.image import as_gray, check_image, stretched_to_8_bit
-from ahf_ros.target import UNDECODED, Target, sorted_targets
+from ahf_ros.target import UNDECODED, Target, count_codes, sorted_targets
 
 _WINDOW = 80  # side of the square in which the threshold lies between the extremes, px
 _MINIMUM_CONTRAST = 20  # difference of those for there to be anything, gray values of 8 bit
@@ -50,24 +52,23 @@ _SLACK = 2.0  # radius of a contour over the largest of a dot, px
 _RAYS = 48  # directions in which the edge of a dot is measured
 _SAMPLES = 10  # points on each edge of the band, a sector
 _MINIMUM_SHARE = 0.75  # of its edges, that a dot shows in their place
-_CONTOUR_ERROR = 1.0  # standard deviation of the centre of a contour, px
+_MINIMUM_PLACED = 0.85  # the same of a decoded target, with the edges of its band
 _PART = 1024  # dots measured at a time, which bounds the memory
 
 _DIRECTIONS = 12  # in which a sector is sampled
-_DOT_RADIUS = 0.6  # where the dot is read, dot radii
-_GAP_DEPTHS = (0.4, 0.6)  # shares of the width of the gap, where it is read
+_DOT_RADII = (0.35, 0.65)  # where the dot is read, dot radii
+_GAP_DEPTHS = (0.35, 0.65)  # shares of the width of the gap, where it is read
 _BAND_DEPTHS = (0.3, 0.5, 0.7)  # shares of the width of the band, where it is read
-_MARGIN = 0.5  # distance from the band at which the margin of a target is read, dot radii
-_DOT_PERCENTILE, _GROUND_PERCENTILE = 10, 90  # of the readings, the dot being the larger
-# The dot has the level 1, the ground 0. They part below a half, because the gap shows
-# the ground in all directions, the darkest included, but the dot shows its colour in one place.
-_LEVEL = 0.4
-_STEEPNESS = 4.0  # of the profile about that level
-_MINIMUM_MARGIN = 0.85  # share of the margin that has to have the colour of the ground
+_MARGIN = 0.3  # distance from the band at which the margin of a target is read, dot radii
+_EXTREME = 85  # percentile of the readings that is the darkest ground, or the lightest ink
+_LEVEL = 0.1  # of the way from the ground to the ink of the dot
+_MINIMUM_LEVEL = 0.04  # of the contrast of dot and gap, where the light leaves less
+_STEEPNESS = 10.0  # of the profile about that level, 1/contrast
+_MINIMUM_STEP = 6.0  # contrast of dot and gap, gray values of 8 bit
 _MINIMUM_CLARITY = 0.15  # distance of a sector's mean from the level halfway
-_MINIMUM_COHERENCE = 0.6  # agreement of the grey gradient with one division into sectors, 0 to 1
-_MINIMUM_DEVIATION = 0.1  # of samples from 0 or 1, from which certainties are computed
+_MINIMUM_COHERENCE = 0.5  # agreement of the grey gradient with one division into sectors, 0 to 1
 _NO_GRADIENT = 1e-9  # instead of a sum of none
+_MINIMUM_DEVIATION = 0.1  # of samples from 0 or 1, from which certainties are computed
 
 
 def masks(gray: np.ndarray, polarities: Sequence[int]) -> Iterator[tuple[int, np.ndarray]]:
@@ -140,68 +141,62 @@ class TraditionalDetector(FamilyDetector):
         The threshold sees the image scaled to 8 bit, extremes to 0 and 255; edges and bands are
         measured in the image as it is.
         """
-        return self._identify(image, fine=True)
-
-    @one_blas_thread()
-    def draft(self, image: np.ndarray) -> list[Target]:
-        """Identify in less than half of the time, with centres to about a pixel."""
-        return self._identify(image, fine=False)
+        check_image(image)
+        settings = self.settings
+        gray = as_gray(image).astype(np.float32, copy=False)
+        colours: list[list[Target]] = []
+        for polarity, mask in masks(stretched_to_8_bit(image), settings.polarities):
+            frames = blob_frames(mask, *settings.radii)
+            colours.append([])
+            for start in range(0, len(frames), _PART):
+                part = frames[start : start + _PART]
+                colours[-1] += _identify_dots(gray, part, polarity, settings)
+        most = max(map(count_codes, colours))
+        targets = [it for found in colours if count_codes(found) == most for it in found]
+        targets = _resolve(targets, self.design)
+        if not settings.report_undecoded:
+            targets = [target for target in targets if target.id != UNDECODED]
+        return sorted_targets(targets)
 
     @one_blas_thread()
     def refine(self, image: np.ndarray, targets: Sequence[Target]) -> list[Target]:
         """Return targets with their centres in an image; see `refine_centres`."""
         return refine_centres(image, targets, (self.design,), self.settings.polarities)
 
-    def _identify(self, image: np.ndarray, fine: bool) -> list[Target]:
-        check_image(image)
-        settings, targets = self.settings, []
-        gray = as_gray(image).astype(np.float32, copy=False)
-        for polarity, mask in masks(stretched_to_8_bit(image), settings.polarities):
-            frames = blob_frames(mask, *settings.radii)
-            for start in range(0, len(frames), _PART):
-                part = frames[start : start + _PART]
-                targets += _identify_dots(gray, part, polarity, settings, fine)
-        targets = _resolve(targets, self.design)
-        if not settings.report_undecoded:
-            targets = [target for target in targets if target.id != UNDECODED]
-        return sorted_targets(targets)
-
 
 def _identify_dots(
-    gray: np.ndarray, frames: np.ndarray, polarity: int, settings: DetectorSettings, fine: bool
+    gray: np.ndarray, frames: np.ndarray, polarity: int, settings: DetectorSettings
 ) -> list[Target]:
     """Return the targets among dots, undecoded where they have no code word."""
-    covariance = np.broadcast_to(_CONTOUR_ERROR**2 * np.eye(2), (len(frames), 2, 2))
     code = settings.codes(Family)[0]
-    if fine:
-        fit = fit_dots(gray, frames, np.full(len(frames), polarity), rays=_RAYS, reach=REACH)
-        fit = fit.select(fit.share >= _MINIMUM_SHARE)
-        frames, covariance = fit.frames, fit.covariance
-    if not len(frames):
+    signs = np.full(len(frames), polarity)
+    fit = fit_dots(gray, frames, signs, rays=_RAYS, reach=REACH)
+    fit = fit.select(fit.share >= _MINIMUM_SHARE)
+    if not len(fit.frames):
         return []
-    readings = _read_by_gradient(gray, frames, polarity, code)
-    ids = np.array(
-        [
-            (code.number(int(word)) if certainty else None) or UNDECODED
-            for word, certainty in zip(readings.words, readings.certainty, strict=True)
-        ]
-    )
-    if fine:
-        decoded = np.flatnonzero(ids != UNDECODED)
-        read, dots = readings.select(decoded), fit.select(decoded)
-        circles = target_circles(read.words, read.starts, dots.polarity, _SAMPLES, code)
-        joint = fit_circles(gray, dots.frames, circles, reach=REACH, projective=True)
-        good = joint.share >= _MINIMUM_SHARE
-        fit = fit.replaced(decoded[good], joint.select(good))
-        frames, covariance = fit.frames, fit.covariance
-    major, _, _ = ellipse_axes(frames)
+    readings = _read_by_level(gray, fit.frames, polarity, code)
+    ids = np.where(readings.certainty > 0, code.ids(readings.words), 0)
+    ids[ids == 0] = UNDECODED
+    decoded = np.flatnonzero(ids != UNDECODED)
+    read, dots = readings.select(decoded), fit.select(decoded)
+    circles = target_circles(read.words, read.starts, dots.polarity, _SAMPLES, code)
+    joint = fit_circles(gray, dots.frames, circles, reach=REACH, projective=True)
+    good = joint.share >= _MINIMUM_PLACED
+    fit = fit.replaced(decoded[good], joint.select(good))
+    ids[decoded[~good]] = UNDECODED
+    major, _, _ = ellipse_axes(fit.frames)
     minimum, maximum = settings.radii
-    shown = (minimum <= major) & (major <= maximum) & readings.surrounded
-    shown &= settings.report_undecoded | (ids != UNDECODED)
+    shown = (minimum <= major) & (major <= maximum)
+    shown &= (ids != UNDECODED) | (settings.report_undecoded & readings.surrounded)
     confidence = np.where(ids == UNDECODED, 0.0, readings.certainty)
     codes = code.canonical(readings.words)
     return targets_from_frames(
-        frames[shown], covariance[shown], ids[shown], codes[shown], confidence[shown], code.name
+        fit.frames[shown],
+        fit.covariance[shown],
+        ids[shown],
+        codes[shown],
+        confidence[shown],
+        code.name,
     )
 
 
@@ -245,40 +240,43 @@ class BandReadings(ArrayRecord):
     certainty: np.ndarray
 
 
-def _read_by_gradient(
+def _read_by_level(
     gray: np.ndarray, frames: np.ndarray, polarity: int, code: Family
 ) -> BandReadings:
-    """Read the bands of targets of one polarity, by their grey gradient.
+    """Read the bands of targets of one polarity: ink is what is darker than their darkest ground.
 
-    It takes light that is even across a target.
+    Light that changes across a target may make its ink as bright here as its ground is elsewhere,
+    but gap and margin show how dark the ground of this target gets.
     """
     inner, outer = code.band_inner, code.band_outer
     gap = 1 + (inner - 1) * np.array(_GAP_DEPTHS)
     band = inner + (outer - inner) * np.array(_BAND_DEPTHS)
     angles = -2 * np.pi * np.arange(_DIRECTIONS * code.bits) / (_DIRECTIONS * code.bits)
-    radii = np.concatenate([[_DOT_RADIUS], gap, band, [outer + _MARGIN]])
+    radii = np.concatenate([_DOT_RADII, gap, band, [outer + _MARGIN]])
     pixels = project(frames, circle_points(angles, radii))
     values = -polarity * sample(gray, pixels)  # the larger, the more like the dot
     of_dot, of_gap, of_band, of_margin = np.split(
-        values, np.cumsum([1, len(gap), len(band)]), axis=2
+        values, np.cumsum([len(_DOT_RADII), len(gap), len(band)]), axis=2
     )
     inside = np.all(within(pixels, gray.shape), axis=1)
+    dot, around, margin = (of.mean(axis=2) for of in (of_dot, of_gap, of_margin))
 
-    dot = np.percentile(of_dot[..., 0], _DOT_PERCENTILE, axis=1)
-    ground = np.percentile(of_gap, _GROUND_PERCENTILE, axis=(1, 2))
-    contrast = np.where(dot > ground, dot - ground, np.inf)[:, None, None]
-    ground = ground[:, None, None]
-    surrounded = (dot > ground[:, 0, 0]) & inside[:, len(gap)]
-    margin = ((of_margin - ground) / contrast < _LEVEL)[..., 0].mean(axis=1)
-    levels = ((of_band - ground) / contrast).mean(axis=2)
-    profiles = np.clip(_STEEPNESS * (levels - _LEVEL) + 0.5, 0, 1)
+    ink = np.percentile(dot, 100 - _EXTREME, axis=1)
+    surrounded = ink > np.percentile(around, _EXTREME, axis=1)
+    surrounded &= inside[:, : len(_DOT_RADII) + len(gap)].all(axis=1)
+    ground = np.percentile(np.hstack([around, margin]), _EXTREME, axis=1)
+    contrast = np.median(dot - around, axis=1)
+    clear = inside.all(axis=1) & (contrast > _MINIMUM_STEP)
+    level = ground + np.maximum(_LEVEL * (ink - ground), _MINIMUM_LEVEL * contrast)
+    scale = np.where(clear, contrast, np.inf)[:, None, None]
+    profiles = (of_band - level[:, None, None]) / scale
+    profiles = np.clip(_STEEPNESS * profiles + 0.5, 0, 1).mean(axis=2)
     means, starts, deviation, coherence = _sectors(profiles, code.bits)
     words = (means > 0.5) @ (1 << np.arange(code.bits))
     spread = np.maximum(deviation, _MINIMUM_DEVIATION)[:, None]
     odds = np.abs(2 * means - 1) / (2 * spread**2)
     certainty = np.prod(1 / (1 + np.exp(-odds)), axis=1)
-    whole = surrounded & inside[:, len(gap) + len(band)] & (margin > _MINIMUM_MARGIN)
-    whole &= np.abs(means - 0.5).min(axis=1) > _MINIMUM_CLARITY
+    whole = clear & (np.abs(means - 0.5).min(axis=1) > _MINIMUM_CLARITY)
     whole &= coherence > _MINIMUM_COHERENCE
     certainty = np.where(whole, certainty, 0.0)
     return BandReadings(surrounded=surrounded, words=words, starts=starts, certainty=certainty)
@@ -302,7 +300,7 @@ def _sectors(profiles: np.ndarray, bits: int) -> tuple[np.ndarray, ...]:
         1 where the gradient lies at the edges of the sectors alone, 0 where it lies anywhere.
     """
     count, samples = profiles.shape
-    gradient = np.abs(profiles - np.roll(profiles, 1, axis=1))
+    gradient = (profiles - np.roll(profiles, 1, axis=1)) ** 2  # whole steps, not noise
     turn = 2 * np.pi * (np.arange(samples) - 0.5) / _DIRECTIONS
     resultant = gradient @ np.exp(1j * turn)
     coherence = np.abs(resultant) / np.maximum(gradient.sum(axis=1), _NO_GRADIENT)

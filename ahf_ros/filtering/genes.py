@@ -30,6 +30,15 @@ FIRST = ((3.1, 0.85, -2.5, 0.0), (4.0, 0.18, -3.0, -2.0), (3.8, 0.85, -0.5, 0.0)
 most often, the others `gsi` and `dots`; where none of them shows more targets than the image as
 received, hardly any other filter does."""
 
+BEGINNING = (
+    (2.0, 0.7, 0.5, -3.0),
+    (1.2, 0.9, -3.5, -3.0),
+    (1.2, 0.3, -0.5, -2.0),
+    (1.2, 0.3, 1.0, -1.0),
+)
+"""The same for detectors that need a filter. Of a hundred, through these `traditional` read most
+targets under stripes and lattices in development, and they are far apart."""
+
 
 def genes_of(settings: TuningSettings, combinations: int = 1) -> tuple[Gene, ...]:
     """Return the genes of the search space; cut-off and exponent are in octaves."""

@@ -28,9 +28,9 @@ import numpy as np
 from ahf_ros.blas import one_blas_thread
 from ahf_ros.deprecation import deprecated_arguments
 from ahf_ros.edge_shift import median_edge_shift
-from ahf_ros.filtering.genes import FIRST, genes_of, tuned
+from ahf_ros.filtering.genes import BEGINNING, FIRST, genes_of, tuned
 from ahf_ros.filtering.genetic import SearchResult, Values, search
-from ahf_ros.filtering.settings import AdaptiveSettings
+from ahf_ros.filtering.settings import PUBLISHED, AdaptiveSettings
 from ahf_ros.filtering.trials import DetectorFunction, Trials, confirmed, fused
 from ahf_ros.imaging.stack import ImageStack
 from ahf_ros.notices import said_once
@@ -41,7 +41,6 @@ from ahf_ros.target import (
     SearchTrace,
     Target,
     UndecodedTarget,
-    count_codes,
     repeated_targets,
     sorted_targets,
 )
@@ -124,8 +123,8 @@ class Identifier:
     interrupt : callable, optional
         Called before each identification; what it raises ends `identify`.
     patience : int
-        Patience of a search where the settings have 0; without fusion, which lives on many
-        filters. 0 for no limit.
+        Patience of a search where the settings have 0, which then shows what its best filter does:
+        fusion lives on many. 0 for no limit.
     contested : bool
         Whether the results have targets that another one contradicts, with the ID `UNDECODED`.
     mirrored : callable, optional
@@ -173,9 +172,11 @@ class Identifier:
         self._detector = _interruptible(detector, interrupt)
         self._draft = _interruptible(draft, interrupt)
         self._settings = settings = settings or AdaptiveSettings()
-        if not settings.genetic.patience and not settings.fusion:
+        self._fusion = settings.fusion and settings.tuning.search != PUBLISHED
+        if patience and not settings.genetic.patience:
             genetic = replace(settings.genetic, patience=patience)
             self._settings = replace(settings, genetic=genetic)
+            self._fusion = False
         self._expected_targets = expected_targets
         self._refine = refine
         self._estimate = estimate
@@ -227,10 +228,10 @@ class Identifier:
         -------
         Identification
             The result with the smallest `|N - n|`; of equally good ones the one from the image as
-            received, then the first. With `fusion`, and after a search, what this filter and the
-            others show together, see `ahf_ros.filtering.trials`. The evaluations of its filter
-            state are the identifications that led to it; threads may have begun others when the
-            right one was found.
+            received, then the first. With `fusion`, and after a search in vain, that on which this
+            filter and the others agree, see `ahf_ros.filtering.trials`. The evaluations of its
+            filter state are the identifications that led to it; threads may have begun others
+            when the right one was found.
 
         Raises
         ------
@@ -257,7 +258,8 @@ class Identifier:
                 wanted = self._estimated(trials, executor) if estimating else expected
                 choice = self._chosen(trials, wanted, executor)
         targets = trials.targets[choice.filter]
-        fusing = settings.fusion and choice.tried
+        missed = trials.discrepancy(choice.expected, choice.filter)
+        fusing = self._fusion and choice.tried and missed
         if fusing:
             agreeing = dict.fromkeys([choice.filter, *trials.plain, *choice.tried])
             targets = fused([trials.targets[values] for values in agreeing])
@@ -267,7 +269,7 @@ class Identifier:
                 it for it in targets if not (isinstance(it, UndecodedTarget) and it.is_contested)
             ]
         self.last_search = choice.search
-        settled = (count_codes(targets), choice.expected) if estimating else None
+        settled = (trials.count(choice.filter), choice.expected) if estimating else None
         self.memory = replace(self.memory, filter=choice.remembered, settled=settled)
         number, gains = trials.parts(choice.filter)
         received = trials.image(choice.filter)
@@ -315,11 +317,13 @@ class Identifier:
         genes = genes_of(settings.tuning, len(trials.plain))
         initial = [remembered] if remembered and len(remembered) == len(genes) else []
         reference = math.inf
+        combination = plain or ()
+        count = len(genes) - len(combination)
         if settings.genetic.patience:
-            combination = plain or ()
-            count = len(genes) - len(combination)
             initial += [(*values[:count], *combination) for values in FIRST]
             reference = searched.discrepancy(expected, plain, executor)
+        elif settings.tuning.search != PUBLISHED:
+            initial += [(*values, *combination) for values in BEGINNING]
         result = search(
             partial(searched.discrepancy, expected),
             genes,

@@ -134,7 +134,7 @@ class GeneticSettings:
     patience: int = parameter(
         0,
         'Filters in a row that show no more targets than before, after which a search ends; 0: '
-        '2 for ring, 3 for gsi and dots, no limit for others and with fusion.',
+        '2 for ring, 3 for gsi and dots, no limit for others.',
         minimum=0,
         maximum=1000000,
     )
@@ -173,9 +173,10 @@ class AdaptiveSettings:
         'IDs are left out, and doubtful targets are weighed with them.',
     )
     fusion: bool = parameter(
-        False,
-        'Whether to add targets that only other filters than the best one show, after a search '
-        'that has not found all.',
+        True,
+        'Whether a search that has not found all shows the targets on which its filters agree, '
+        'not those of the best one alone; not so the published search, nor one that ends with the '
+        'patience of its detector.',
     )
     coarse: bool = parameter(
         False,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor
 from dataclasses import asdict, dataclass, field
 from functools import partial
@@ -32,7 +32,7 @@ CONFIRMED = 5
 _REACH = 0.5  # semi-major axes; targets that are closer are at the same place
 _MINIMUM_REACH = 2.0  # px, for dots so small that noise moves their centres further
 _MINIMUM_FILTERS = 2  # that must agree on a target that the best filter does not show
-_MAJORITY = 2  # times the filters of any contradicting claim: two to one
+_MAJORITY = 5  # times the filters that contradict a claim: five to one
 
 
 class Trials:
@@ -196,9 +196,9 @@ def fused(results: Sequence[Sequence[Target]]) -> list[Target]:
 
     The best filter for the whole image may hide a target that another one shows. If the light
     makes a detector read a wrong ID, it does so through few filters, and the wrong ID varies. A
-    target counts if the best filter, the first one, or at least two others show it, and if twice
-    as many filters show it as any contradicting claim: another ID at its place, or its ID at
-    another place. Undecoded targets are ignored.
+    target counts if the best filter, the first one, or at least two others show it, and if five
+    times as many filters show it as contradict it: as show, without it, another target that its
+    dot overlaps, or its ID at another place. Undecoded targets are ignored.
     """
     by_key: defaultdict[tuple[str, int], list[_Claim]] = defaultdict(list)
     for index, targets in enumerate(results):
@@ -211,15 +211,21 @@ def fused(results: Sequence[Sequence[Target]]) -> list[Target]:
                 by_key[target.key] += same
             same[0].filters.add(index)
     claims = list(chain.from_iterable(by_key.values()))
-    kept = [
-        claim.target
-        for claim in claims
-        if (claim.first == 0 or len(claim.filters) >= _MINIMUM_FILTERS)
-        and all(
-            len(claim.filters) >= _MAJORITY * len(other.filters)
-            for other in claims
-            if other is not claim
-            and (other.target.key == claim.target.key or claim.near(other.target))
-        )
-    ]
+    kept = []
+    for claim, rivals in zip(claims, _rivals([claim.target for claim in claims]), strict=True):
+        against = set().union(*(claims[index].filters for index in rivals)) - claim.filters
+        agreed = claim.first == 0 or len(claim.filters) >= _MINIMUM_FILTERS
+        if agreed and len(claim.filters) >= _MAJORITY * len(against):
+            kept.append(claim.target)
     return sorted_targets(kept)
+
+
+def _rivals(targets: Sequence[Target]) -> Iterator[list[int]]:
+    """Yield for each target the indices of those that cannot be right with it."""
+    keys = np.unique([f'{it.family} {it.id}' for it in targets], return_inverse=True)[1]
+    x, y, radius = np.reshape([(it.x, it.y, it.semi_major) for it in targets], (-1, 3)).T
+    for index, key in enumerate(keys):
+        overlapping = np.hypot(x - x[index], y - y[index]) < radius + radius[index]
+        overlapping |= keys == key
+        overlapping[index] = False
+        yield np.flatnonzero(overlapping).tolist()

@@ -31,16 +31,31 @@ def test_the_place_is_that_of_the_best_filter_that_shows_a_target():
 
 def test_two_ids_at_one_place_cancel_each_other_unless_one_is_clear():
     one, other = [at(1, 100)], [at(2, 102)]
-    assert places([one, other, one]) == [(1, 100)]
-    assert places([one, other, one, other]) == []
-    assert places([one, other, other, other]) == [(2, 102)]
+    assert places([one, *[other] * 5]) == [(2, 102)]
+    assert places([one, *[other] * 4]) == []
+    assert places([one, *[other] * 5, one]) == []
+    assert places([*[one] * 5, other]) == [(1, 100)]
     assert places([one, other]) == []
 
 
 def test_one_id_at_two_places():
     here, there = [at(1, 100)], [at(1, 400)]
-    assert places([here, there, here, here]) == [(1, 100)]
-    assert places([here, there, here, there]) == []
+    assert places([there, *[here] * 5]) == [(1, 100)]
+    assert places([there, *[here] * 4]) == []
+
+
+def test_all_that_contradicts_counts_together():
+    """A spot of light may look like a target wherever there is one, through few filters each."""
+    often, elsewhere = [at(1, 100)], [[at(1, 400)], [at(1, 700)]]
+    assert places([*[often] * 5, elsewhere[0]]) == [(1, 100)]
+    assert places([*[often] * 9, *elsewhere]) == []
+    assert places([*[often] * 10, *elsewhere]) == [(1, 100)]
+
+
+def test_dots_that_overlap_cannot_both_be_there():
+    dot, beside, apart = at(1, 100), at(2, 119), at(2, 121)
+    assert places([[dot], [dot], [beside], [beside]]) == []
+    assert places([[dot], [dot], [apart], [apart]]) == [(1, 100), (2, 121)]
 
 
 def test_one_id_of_two_families_is_two_targets():
@@ -54,25 +69,42 @@ def test_undecoded_targets_are_left_out_and_nothing_is_nothing():
     assert fused([]) == []
 
 
+IMAGE = np.random.default_rng(0).integers(0, 200, (40, 50)).astype(np.uint8)
+IMAGE[0, :3] = 1, 2, 3
+
+
+def three(shown: np.ndarray) -> list[Target]:
+    """Return targets 1 to 3 or 2 to 4, by the mean of an image, none in the one received."""
+    if shown[0, :3].tolist() == [1, 2, 3]:
+        return []
+    first = 1 + round(1000 * float(shown.mean())) % 2
+    return [at(number, 100.0 * number) for number in range(first, first + 3)]
+
+
+def identifier(**changes) -> Identifier:
+    settings = AdaptiveSettings(genetic=GeneticSettings(max_evaluations=30), **changes)
+    return Identifier(three, settings, expected_targets=4)
+
+
 def test_a_search_that_finds_no_filter_for_all_shows_what_several_do():
-    """Every image but the one received shows targets 1 to 3 or 2 to 4, by its mean."""
-    image = np.random.default_rng(0).integers(0, 200, (40, 50)).astype(np.uint8)
-    image[0, :3] = 1, 2, 3
-
-    def detector(shown: np.ndarray) -> list[Target]:
-        if shown[0, :3].tolist() == [1, 2, 3]:
-            return []
-        first = 1 + round(1000 * float(shown.mean())) % 2
-        return [at(number, 100.0 * number) for number in range(first, first + 3)]
-
-    def identify(**changes):
-        settings = AdaptiveSettings(genetic=GeneticSettings(max_evaluations=30), **changes)
-        return Identifier(detector, settings).identify(image, expected_targets=4)
-
-    single = identify()
+    single = identifier(fusion=False).identify(IMAGE)
     assert single.count == 3
-    together = identify(fusion=True)
+    together = identifier().identify(IMAGE)
     assert [target.id for target in together.targets] == [1, 2, 3, 4]
     assert together.filter.gamma_high == single.filter.gamma_high
-    alone = identify(fusion=True, threads=1)
+    alone = identifier(threads=1).identify(IMAGE)
     assert alone.targets == together.targets
+
+
+def test_a_filter_that_shows_all_is_believed():
+    results = iter([[], [at(1, 100), at(2, 200), at(3, 300)], [at(1, 100), at(2, 200)]])
+    found = Identifier(lambda _: next(results), AdaptiveSettings(threads=1), expected_targets=2)
+    assert [target.id for target in found.identify(IMAGE)] == [1, 2]
+
+
+def test_a_steady_stream_is_not_searched_again_though_filters_agreed_on_more():
+    """The filter that worked last shows three of the four again."""
+    settings = AdaptiveSettings(genetic=GeneticSettings(max_evaluations=30))
+    stream = Identifier(three, settings, estimate=lambda _: 5)
+    assert [len(stream.identify(IMAGE)) for _ in range(2)] == [4, 3]
+    assert stream.last_search is None

@@ -23,7 +23,7 @@ from ahf_ros.synthetic.scene import SceneSettings, render
 from ahf_ros.target import UNDECODED, Target, UndecodedTarget, count_codes
 
 COUNT = 144
-SHORT = AdaptiveSettings(genetic=GeneticSettings(max_evaluations=30))
+SHORT = AdaptiveSettings(fusion=False, genetic=GeneticSettings(max_evaluations=30))
 
 
 def identify(image, detector, expected, settings=None, **parts):
@@ -163,13 +163,34 @@ def test_a_search_in_vain_ends_with_the_patience_of_the_detector(threads):
     assert identifier.last_search.tried == FIRST[:2]
 
 
-@pytest.mark.parametrize(
-    'settings',
-    [AdaptiveSettings(fusion=True), AdaptiveSettings(genetic=GeneticSettings(patience=100))],
-)
-def test_fusion_and_the_settings_come_before_the_patience_of_the_detector(settings):
+def test_the_settings_come_before_the_patience_of_the_detector():
+    settings = AdaptiveSettings(genetic=GeneticSettings(patience=100))
     identifier = Identifier(lambda image: [target(1)], settings, patience=2)
     assert identifier.identify(DIM, expected_targets=5).filter.evaluations == 51
+
+
+@pytest.mark.parametrize(
+    ('changes', 'patience', 'agreed'),
+    [
+        ({}, 0, True),
+        ({'genetic': GeneticSettings(patience=3)}, 2, True),
+        ({}, 3, False),
+        ({'fusion': False}, 0, False),
+        ({'tuning': TuningSettings(search='published')}, 0, False),
+    ],
+    ids=['default', 'patience set', 'patience of the detector', 'switched off', 'published'],
+)
+def test_whether_filters_have_to_agree(changes, patience, agreed):
+    """Every filter shows another target beside the one that all show."""
+    numbers = iter(range(2, 1000))
+
+    def detector(image):
+        return [] if image is DIM else [target(1), target(next(numbers), 9.0)]
+
+    settings = AdaptiveSettings(threads=1, **changes)
+    result = Identifier(detector, settings, patience=patience).identify(DIM, expected_targets=9)
+    assert result.filter.applied
+    assert [it.id for it in result.targets] == ([1] if agreed else [1, 2])
 
 
 def test_a_filter_that_shows_more_keeps_a_search_going():
@@ -282,7 +303,8 @@ def test_centres_are_refined_in_the_image_as_received():
         assert image is DIM
         return [replace(it, x=it.x + 0.25) for it in targets]
 
-    result = identify(DIM, Dots(), COUNT, refine=refine)
+    published = AdaptiveSettings(tuning=TuningSettings(search=PUBLISHED))
+    result = identify(DIM, Dots(), COUNT, published, refine=refine)
     assert result.filter.applied
     assert [it.x for it in result.targets[:2]] == [4.25, 12.25]
 
@@ -511,7 +533,8 @@ class Blocks(Dots):
 def test_a_coarse_search_confirms_its_best_filters_on_the_whole_image():
     large = np.kron(DIM, np.ones((2, 2), np.uint8))
     detector = Blocks()
-    settings = replace(SHORT, coarse=True, threads=1)
+    published = TuningSettings(search=PUBLISHED)
+    settings = replace(SHORT, coarse=True, threads=1, tuning=published)
     result = identify(large, detector, COUNT, settings)
     shapes = [image.shape for image in detector.images]
     coarse = shapes.count((96, 96))

@@ -17,7 +17,7 @@ SHORT = AdaptiveSettings(genetic=GeneticSettings(max_evaluations=12))
 
 
 def targets(count: int) -> list[Target]:
-    return [Target(n, n, float(n), 1.0, 1.0, 1.0) for n in range(1, count + 1)]
+    return [Target(n, n, 9.0 * n, 1.0, 1.0, 1.0) for n in range(1, count + 1)]
 
 
 class Liking:
@@ -55,7 +55,8 @@ def test_the_combination_is_a_gene_of_the_search():
         plain = any(np.array_equal(image, STACK.combined(name)) for name in COMBINATIONS)
         return targets(2 if plain else 4)
 
-    identifier = Identifier(detector, SHORT, expected_targets=5)
+    settings = AdaptiveSettings(genetic=GeneticSettings(max_evaluations=40))
+    identifier = Identifier(detector, settings, expected_targets=5)
     found = identifier.identify(STACK)
     assert (found.count, found.filter.applied) == (4, True)
     assert identifier.last_search is not None
@@ -64,7 +65,7 @@ def test_the_combination_is_a_gene_of_the_search():
     assert found.search is not None
     assert set(found.search.combinations) == set(COMBINATIONS)
     assert {len(values) for values in identifier.last_search.tried} == {5}
-    assert found.filter.evaluations == 12 + len(COMBINATIONS)
+    assert found.filter.evaluations == 40 + len(COMBINATIONS)
 
 
 def test_a_result_does_not_depend_on_threads():
