@@ -286,6 +286,25 @@ def test_corners_and_ellipse_are_those_of_the_marker(detect):
         assert across[0] * down[1] > across[1] * down[0]  # clockwise as seen, y pointing down
 
 
+def test_what_neither_edges_nor_print_fit_states_its_error(detect):
+    """On wavy paper contours alone tell where a marker is."""
+    shown = scene(targets=16, dot_radius=12.0)
+    places = np.array([(it.x, it.y) for it in shown.targets])
+    y, x = np.mgrid[: shown.image.shape[0], : shown.image.shape[1]].astype(np.float32)
+    moved = x - 2 * np.sin(y / 15), y - 2 * np.sin(x / 15)
+    there = places
+    for _ in range(50):
+        there = places + 2 * np.sin(there[:, ::-1] / 15)
+    true = dict(zip([it.id for it in shown.targets], there, strict=True))
+    image = cv2.remap(shown.image, *moved, cv2.INTER_CUBIC)
+    loose = [it for it in detect(image) if it.edge_shift is None]
+    assert len(loose) >= 4
+    errors = np.array([(it.x, it.y) - true[it.id] for it in loose])
+    squares = (errors**2).sum(axis=1) / [it.covariance[0] for it in loose]
+    assert 0.3 < squares.mean() / 2 < 2
+    assert squares.max() < 12
+
+
 def test_what_has_no_corners_or_no_sides_stays_where_it_is(detect):
     shown = scene()
     markers = detect(shown.image)
