@@ -77,9 +77,8 @@ class SquareDetector(FamilyDetector):
         corners, readings = [np.zeros((0, 4, 2))], [np.zeros((0, 5))]
         for level, half in enumerate(halved(gray, levels)):
             found = find_quadrilaterals(half)
-            if not level:  # what is small in a half is large enough here
-                small = np.linalg.norm(found[:, 2] - found[:, 0], axis=1) < _SMALL
-                found[small] = lay_outlines(half, found[small])
+            small = np.linalg.norm(found[:, 2] - found[:, 0], axis=1) < _SMALL
+            found[small] = lay_outlines(half, found[small])
             found, read_as = _read(half, found, groups)
             corners.append((found + 0.5) * 2**level - 0.5)
             readings.append(read_as)
