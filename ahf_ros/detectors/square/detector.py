@@ -78,12 +78,10 @@ class SquareDetector(FamilyDetector):
         for level, half in enumerate(halved(gray, levels)):
             found = find_quadrilaterals(half)
             small = np.linalg.norm(found[:, 2] - found[:, 0], axis=1) < _SMALL
-            laid = lay_outlines(half, found[small])
-            if level:  # larger in other levels, where patterns of light mislead outlines more
-                moved = (laid != found[small]).any(axis=(1, 2))
-                found = np.concatenate([found, laid[moved]])
-            else:
-                found[small] = laid
+            if level == 0:
+                found[small] = lay_outlines(half, found[small])
+            elif level == 1:  # where contours do as well, unless light or a lens spreads
+                found = np.concatenate([found, lay_outlines(half, found[small])])
             found, read_as = _read(half, found, groups)
             corners.append((found + 0.5) * 2**level - 0.5)
             readings.append(read_as)
