@@ -69,15 +69,21 @@ def words(name: str) -> np.ndarray:
     return np.array(prints)[:, 1:-1, 1:-1] > 0
 
 
+def corner_counts(name: str) -> np.ndarray:
+    """Return how many corners what is white on the markers of a dictionary has, (k,), by ID."""
+    cells = np.pad(words(name), ((0, 0), (1, 1), (1, 1)))
+    corners = cells[:, :-1, :-1] ^ cells[:, :-1, 1:] ^ cells[:, 1:, :-1] ^ cells[:, 1:, 1:]
+    counts: np.ndarray = corners.sum(axis=(1, 2))
+    return counts
+
+
 @lru_cache(maxsize=64)
 def are_plain(name: str) -> np.ndarray:
     """Return which markers of a dictionary letters and windows look like, bool, shape (k,), by ID.
 
     What is white on them has few corners for the number of their cells.
     """
-    cells = np.pad(words(name), ((0, 0), (1, 1), (1, 1)))
-    corners = cells[:, :-1, :-1] ^ cells[:, :-1, 1:] ^ cells[:, 1:, :-1] ^ cells[:, 1:, 1:]
-    return np.asarray(corners.mean(axis=(1, 2)) < _PLAIN)
+    return corner_counts(name) < _PLAIN * (words(name).shape[1] + 1) ** 2
 
 
 def borders(name: str) -> tuple[int, ...]:

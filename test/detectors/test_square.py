@@ -133,6 +133,49 @@ def test_letters_show_no_dictionary():
     assert create_detector(family=','.join(SQUARE_NAMES))(page) == []
 
 
+def rounded(height: int, width: int, radius: int) -> np.ndarray:
+    """Return a rectangle with round corners, 1 on 0."""
+    inner = np.pad(np.ones((height - 2 * radius, width - 2 * radius), np.uint8), radius)
+    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * radius + 1, 2 * radius + 1))
+    return cv2.dilate(inner, disc)
+
+
+def plate(height: int) -> np.ndarray:
+    """Return six letters, 0 and 8, of a number plate; drawn eight times as large."""
+    cell, width = height * 8 // 7, height * 2 // 3
+    page = np.full((14 * cell, 60 * width), 220, np.uint8)
+    for column in range(6):
+        letter = rounded(7 * cell, 7 * width, cell)
+        for top, rows in ((1, 2), (4, 2)) if column % 2 else ((1, 5),):
+            hole = rounded(rows * cell, 3 * width, cell // 2)
+            letter[top * cell : (top + rows) * cell, 2 * width : 5 * width] -= hole
+        left = (3 + 9 * column) * width
+        page[3 * cell : 10 * cell, left : left + 7 * width][letter > 0] = 50
+    page = cv2.resize(page, None, fx=1 / 8, fy=1 / 8, interpolation=cv2.INTER_AREA)
+    return cv2.GaussianBlur(page, (0, 0), 0.7)
+
+
+def test_hardly_any_letter_with_round_corners_is_a_marker():
+    """Of 66, four are where a quarter of the image shows no corner to be round."""
+    detect = create_detector(family='aruco_original')
+    assert sum(len(detect(plate(height))) for height in range(20, 101, 8)) <= 6
+
+
+def test_sides_of_letters_converge():
+    """A blunt A has the cells of ID 17 of aruco_4x4_50, whose lower half is black."""
+    cells = np.kron(marker(FAMILY, 17, 1), np.ones((40, 40), np.uint8)) // 255 * 170 + 50
+    side = len(cells)
+    square = np.array([[0, 0], [side, 0], [side, side], [0, side]], np.float32)
+    for inset, expected in ((0, [17]), (13, [])):
+        letter = square * 36 / side + 60 + np.array([[inset, 0], [-inset, 0], [0, 0], [0, 0]])
+        turn = cv2.getPerspectiveTransform(square, letter.astype(np.float32))
+        page = cv2.warpPerspective(
+            cells, turn, (640, 480), flags=cv2.INTER_AREA, borderValue=220, borderMode=0
+        )
+        found = create_detector(family=FAMILY)(cv2.GaussianBlur(page, (0, 0), 0.8))
+        assert [it.id for it in found] == expected
+
+
 @pytest.mark.parametrize('seed', [8, 9])
 def test_plain_markers_show_their_dictionary_with_others(seed):
     shown = scene('aruco_original', seed=seed)
@@ -241,6 +284,25 @@ def test_corners_and_ellipse_are_those_of_the_marker(detect):
         assert np.hypot(*sides.T) == pytest.approx(np.full(4, 2 * target.semi_major), rel=0.15)
         across, down = sides[:2]
         assert across[0] * down[1] > across[1] * down[0]  # clockwise as seen, y pointing down
+
+
+def test_what_neither_edges_nor_print_fit_states_its_error(detect):
+    """On wavy paper contours alone tell where a marker is."""
+    shown = scene(targets=16, dot_radius=12.0)
+    places = np.array([(it.x, it.y) for it in shown.targets])
+    y, x = np.mgrid[: shown.image.shape[0], : shown.image.shape[1]].astype(np.float32)
+    moved = x - 2 * np.sin(y / 15), y - 2 * np.sin(x / 15)
+    there = places
+    for _ in range(50):
+        there = places + 2 * np.sin(there[:, ::-1] / 15)
+    true = dict(zip([it.id for it in shown.targets], there, strict=True))
+    image = cv2.remap(shown.image, *moved, cv2.INTER_CUBIC)
+    loose = [it for it in detect(image) if it.edge_shift is None]
+    assert len(loose) >= 4
+    errors = np.array([(it.x, it.y) - true[it.id] for it in loose])
+    squares = (errors**2).sum(axis=1) / [it.covariance[0] for it in loose]
+    assert 0.3 < squares.mean() / 2 < 2
+    assert squares.max() < 12
 
 
 def test_what_has_no_corners_or_no_sides_stays_where_it_is(detect):

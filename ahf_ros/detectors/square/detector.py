@@ -18,7 +18,7 @@ from ahf_ros.codes.square import are_plain, words
 from ahf_ros.detectors.claims import Rivals, owners
 from ahf_ros.detectors.contract import FamilyDetector, moved_targets
 from ahf_ros.detectors.square.edges import fit_edges
-from ahf_ros.detectors.square.frames import Places, centres
+from ahf_ros.detectors.square.frames import Places, centres, side_lengths
 from ahf_ros.detectors.square.prints import lay_outlines, lay_prints
 from ahf_ros.detectors.square.quadrilaterals import find_quadrilaterals
 from ahf_ros.detectors.square.reading import MINIMUM_ODDS, read
@@ -27,7 +27,7 @@ from ahf_ros.features.pyramid import halved
 from ahf_ros.imaging.image import as_gray, check_image
 from ahf_ros.target import SquareMarker, Target, sorted_targets
 
-_DRAFT_DEVIATION = 0.3  # standard deviation of a centre from corners of contours, px
+_DRAFT_DEVIATION = 0.028  # of a centre from contours where nothing else can be fitted, in sides
 _SMALL = 28.0  # diagonal of a marker whose cells are not much larger than pixels, px
 _SMALLEST_HALF = 24  # smaller side of a half that markers are looked for in, px
 _SAME_PLACE = 0.3  # distance of two readings of one marker, in sides
@@ -77,9 +77,11 @@ class SquareDetector(FamilyDetector):
         corners, readings = [np.zeros((0, 4, 2))], [np.zeros((0, 5))]
         for level, half in enumerate(halved(gray, levels)):
             found = find_quadrilaterals(half)
-            if not level:  # what is small in a half is large enough here
-                small = np.linalg.norm(found[:, 2] - found[:, 0], axis=1) < _SMALL
+            small = np.linalg.norm(found[:, 2] - found[:, 0], axis=1) < _SMALL
+            if level == 0:
                 found[small] = lay_outlines(half, found[small])
+            elif level == 1:  # where contours do as well, unless light or a lens spreads
+                found = np.concatenate([found, lay_outlines(half, found[small])])
             found, read_as = _read(half, found, groups)
             corners.append((found + 0.5) * 2**level - 0.5)
             readings.append(read_as)
@@ -102,7 +104,8 @@ class SquareDetector(FamilyDetector):
             else ''
             for index, group in enumerate(groups)
         ]
-        covariances = np.tile(_DRAFT_DEVIATION**2 * np.eye(2), (len(chosen), 1, 1))
+        deviations = _DRAFT_DEVIATION * side_lengths(places[chosen]).mean(axis=1)
+        covariances = deviations[:, None, None] ** 2 * np.eye(2)
         confidences = 1 / (1 + np.exp(-odds[chosen]))
         fields = _places(places[chosen], covariances, np.full(len(chosen), np.nan))
         return sorted_targets(
@@ -236,7 +239,7 @@ def _from_halves(gray: np.ndarray, corners: np.ndarray, ink: np.ndarray) -> np.n
 
     The contour of a large marker gives its corners to a part of its side, not to two pixels.
     """
-    sides = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
+    sides = side_lengths(corners).max(axis=1)
     levels = max(0, ceil(log2(sides.max() / _LARGE)))
     corners = corners.astype(np.float64)
     halves = halved(gray, levels)

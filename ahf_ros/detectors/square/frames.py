@@ -81,6 +81,16 @@ def changed(frames: np.ndarray, changes: np.ndarray) -> np.ndarray:
     return together
 
 
+def derivatives(frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return how distances and places change at the centres, shapes (k, 2) and (k, 2, 2).
+
+    Distances from the camera change in shares of their own, in a side of the square; places in px.
+    """
+    scaled = frames / frames[:, 2:, 2:]
+    distances = scaled[:, 2, :2]
+    return distances, scaled[:, :2, :2] - scaled[:, :2, 2:] * distances[:, None]
+
+
 def centre_covariance(frames: np.ndarray, normals: np.ndarray, sums: np.ndarray) -> np.ndarray:
     """Return the covariances of centres, px^2, from least squares whose errors come in groups.
 
@@ -92,9 +102,7 @@ def centre_covariance(frames: np.ndarray, normals: np.ndarray, sums: np.ndarray)
     freedom = (count / np.maximum(count - normals.shape[1], 1)) ** 2
     of_all = inverse @ (sums @ np.swapaxes(sums, 1, 2)) @ inverse
     centre = of_all[:, [[2, 2], [5, 5]], [[2, 5], [2, 5]]]
-    scale = frames[:, 2, 2, None, None]
-    along = frames[:, :2, :2] / scale
-    along = along - frames[:, :2, 2:] / scale * frames[:, 2:, :2] / scale
+    _, along = derivatives(frames)
     covariance = along @ centre @ np.swapaxes(along, 1, 2)
     return freedom[:, None, None] * covariance + SYSTEMATIC**2 * np.eye(2)
 

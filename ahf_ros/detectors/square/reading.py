@@ -4,7 +4,12 @@ All cells of the grid that a dictionary has are sampled, those of the border and
 it with them. Ink and paper next to each other in these two rings tell what ink and paper are in
 the light of each cell. A cell speaks for paper by where it is between these levels, but never by
 more than it would if it may be covered. What speaks for a marker is compared with what any other
-cells would have done.
+cells would have done, and with what else has the same cells: a figure with few corners, such as a
+letter, is as likely as its description is short [1]_, and differs by the shape of its frame only.
+
+References
+----------
+.. [1] Rissanen, Modeling by shortest data description, Automatica 14(5), 1978, 465-471.
 """
 
 from __future__ import annotations
@@ -17,13 +22,16 @@ from math import erf, log, sqrt
 import cv2
 import numpy as np
 
-from ahf_ros.codes.square import borders, words
-from ahf_ros.detectors.square.frames import square_frames
+from ahf_ros.codes.square import borders, corner_counts, words
+from ahf_ros.detectors.square.frames import side_lengths, square_frames
+from ahf_ros.detectors.square.shapes import corner_odds, parallel_odds
 from ahf_ros.features.frame import project
 from ahf_ros.features.sampling import sample
 from ahf_ros.imaging.logarithm import LOG_OFFSET
 
 _IN_CELL = (-0.2, 0.2)  # where a cell is sampled, from its centre, in cells
+_CORNER = 0.3  # from a corner of the border, in cells
+_OUTERMOST = (1, 3, 2, 4)  # of the whole cell and its parts, those at the corners
 _BLURS = 0.7, 0.4  # of a usual image and of a sharp one, standard deviations in px
 _SMALL_CELL = 2.0  # below which they differ, px
 _SMALLEST_CELL = 1.0  # that can be read, px
@@ -40,6 +48,7 @@ _PART_WEIGHT = 0.15  # of each part of a cell, which have one colour in other qu
 _BORDER_WEIGHT = 0.3  # of the cells of the border, which are alike in other quadrilaterals, too
 _CORNER_WEIGHT = 0.7
 _DOUBT = 6.0  # logarithmic odds against a marker that nothing but a quadrilateral speaks for
+_FIGURES = 7.0  # logarithmic odds of letters and the like against markers
 _POSSIBLE = -12.0  # minimum of these odds where all is as usual but a corner or the blur
 _CLEAR = -6.0  # maximum of the odds of other markers where these odds are low
 _PLAIN = 0.35  # logarithmic odds against a marker, for each edge less than random cells have
@@ -71,6 +80,7 @@ def read(gray: np.ndarray, corners: np.ndarray, groups: Sequence[Sequence[str]])
     found = [np.zeros((0, 7))]
     frames = square_frames(corners)
     bordered = np.flatnonzero(_dark_inside(gray, frames, _DEPTH))
+    parallel = parallel_odds(frames, max(gray.shape))
     sizes = np.sqrt([cv2.contourArea(of.astype(np.float32)) for of in corners])
     grids = [
         {(words(group[0]).shape[1], border) for border in borders(group[0])} for group in groups
@@ -83,16 +93,19 @@ def read(gray: np.ndarray, corners: np.ndarray, groups: Sequence[Sequence[str]])
         if not len(some):
             continue
         places = frames[some], corners[some], sizes[some]
-        evidence, against, which = _evidence(gray, *places, cells, border)
+        evidence, against, square, which = _evidence(gray, *places, cells, border)
         which = some[which]
+        square += parallel[which]
         for index, group in enumerate(groups):
             if (cells, border) not in grids[index] or not len(which):
                 continue
-            prints, prior, plain = _table(tuple(group))
+            prints, prior, few, drawn = _table(tuple(group))
             odds = evidence @ prints
             odds -= prior
             best = odds.argmax(axis=1)
-            total = odds[np.arange(len(best)), best] + against - _DOUBT - plain[best]
+            of_cells = odds[np.arange(len(best)), best] + against - _DOUBT - few[best]
+            of_shape = square + drawn[best] - prior[best] - _FIGURES
+            total = -np.logaddexp(-of_cells, -of_shape)
             likely = np.flatnonzero(total > _POSSIBLE)
             odds, best, total = odds[likely], best[likely], total[likely]
             # A turn of the same marker is no other: some are symmetric.
@@ -120,11 +133,12 @@ def read(gray: np.ndarray, corners: np.ndarray, groups: Sequence[Sequence[str]])
 
 
 @lru_cache(maxsize=32)
-def _table(group: tuple[str, ...]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the cells of the markers of dictionaries in four turns, and what speaks against each.
+def _table(group: tuple[str, ...]) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Return the cells of the markers of dictionaries in four turns, and three terms for each.
 
-    Other markers do, and letters and the like, which have few edges between cells; these are two
-    terms. The shapes are (cells, 4 n) and twice (4 n,).
+    Other markers speak against it, and textures, which have few edges between cells. The third
+    term is the logarithmic odds against a figure that has just its corners, each at one of the
+    lines between cells. The shapes are (cells, 4 n) and thrice (4 n,).
     """
     cells = words(group[-1])
     turned = np.stack([np.rot90(cells, turn, axes=(1, 2)) for turn in range(4)], axis=1)
@@ -138,6 +152,7 @@ def _table(group: tuple[str, ...]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         turned.reshape(4 * len(cells), -1).T.astype(np.float32),
         np.log(np.repeat(count, 4)).astype(np.float32),
         np.repeat(_PLAIN * np.maximum(usual - edges, 0), 4),
+        np.repeat(corner_counts(group[-1]) * log(cells.shape[1] + 1), 4),
     )
 
 
@@ -169,12 +184,12 @@ def _evidence(
     sizes: np.ndarray,
     cells: int,
     border: int,
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Return what the cells of quadrilaterals within a border say, and indices of these.
 
     It is by how much the logarithmic odds of a marker grow where a cell is paper, shape
-    (k, cells^2), and what they are where all cells are ink, (k,). Those with small cells are there
-    twice, once as in a sharp image.
+    (k, cells^2), what they are where all cells are ink, (k,), and those of square corners, (k,).
+    Those with small cells are there twice, once as in a sharp image.
     """
     side = cells + 2 * border
     places = (np.arange(side + 2) - (side + 1) / 2) / side
@@ -216,7 +231,13 @@ def _evidence(
     around = _BORDER_WEIGHT * against[:, rings.border].sum(axis=1)
     around += _CORNER_WEIGHT * against[:, rings.corners].sum(axis=1)
     paper = np.einsum('p,pkc->kc', weights, odds)[:, rings.inside]
-    return paper.astype(np.float32), against[:, rings.inside].sum(axis=1) + around, tried[which]
+    inside = against[:, rings.inside].sum(axis=1) + around
+    middle, step = middle[:, rings.corners], step[:, rings.corners]
+    outermost = levels[_OUTERMOST, :, rings.corners].T
+    bright = (np.exp(outermost - middle) - np.exp(-step / 2)) / (2 * np.sinh(step / 2))
+    depths = _CORNER * _cell_sizes(corners[tried[which]], side) / blurs[which, None]
+    square = np.clip(corner_odds(bright, depths, _SHARPNESS), -_COVERED, _COVERED).sum(axis=1)
+    return paper.astype(np.float32), inside, square, tried[which]
 
 
 @dataclass(frozen=True, slots=True)
@@ -247,15 +268,20 @@ def _rings(cells: int, border: int) -> _Rings:
     return _Rings(ink, paper, around, corners, inside, weights)
 
 
+def _cell_sizes(corners: np.ndarray, side: int) -> np.ndarray:
+    """Return the width and the height of cells, mean of opposite sides, px, shape (k, 2)."""
+    lengths = side_lengths(corners) / side
+    return (lengths[:, :2] + lengths[:, 2:]) / 2
+
+
 def _unmixed(values: np.ndarray, corners: np.ndarray, side: int, blurs: np.ndarray) -> np.ndarray:
     """Return the gray values of cells, shape (k, n, n), without what blurs mixed into them."""
-    lengths = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2) / side
     count = values.shape[1]
     neighbours = np.eye(count, k=1) + np.eye(count, k=-1)
     neighbours[0, 0] = neighbours[-1, -1] = 1
     across, down = (
         (1 - _ERF(of / blurs / (2 * sqrt(2))).astype(np.float64)) / 2
-        for of in ((lengths[:, 0] + lengths[:, 2]) / 2, (lengths[:, 1] + lengths[:, 3]) / 2)
+        for of in _cell_sizes(corners, side).T
     )
     mixed = [
         np.eye(count)
