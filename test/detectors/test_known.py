@@ -78,9 +78,12 @@ def test_a_dot_may_have_the_shape_of_the_targets_about_it(polarity: int, level: 
     assert np.array_equal(alike.frames[:, :, 2], dots.frames[:, :, 2])
     grown = 1 + 0.5 / np.sqrt(70)
     axes = np.array(frame.ellipse_axes(alike.frames))
-    assert pytest.approx(
-        np.tile([10 * grown / 2**level, 7 * grown / 2**level, 0.6], (2, 1)), rel=1e-6
-    ) == axes.T
+    assert (
+        pytest.approx(
+            np.tile([10 * grown / 2**level, 7 * grown / 2**level, 0.6], (2, 1)), rel=1e-6
+        )
+        == axes.T
+    )
 
 
 def test_dots_of_another_size_or_colour_have_their_own_shape() -> None:
