@@ -127,11 +127,13 @@ def measure_alike(gray: np.ndarray, dots: Fit, families: Sequence[Family]) -> Fi
     dots = replace(dots, covariance=fit.covariance)
     moved = replace(dots, frames=dots.frames.copy())
     moved.frames[:, :2, 2] = fit.frames[:, :2, 2]
-    hope, of_moved = hopes(gray, dots, families), hopes(gray, moved, families)
-    dots = dots.replaced(np.flatnonzero(of_moved > hope), moved.select(of_moved > hope))
-    hope = np.maximum(hope, of_moved)
+    both = Fit.joined([dots, moved])
+    count = len(dots.frames)
+    hope = hopes(gray, both, families).reshape(2, count)
+    best = hope.argmax(axis=0) * count + np.arange(count)
+    hope = hope.max(axis=0)
     order = np.argsort(-hope * dots.clearness**2, kind='stable')
-    return dots.select(order[hope[order] > ALIKE])
+    return both.select(best[order[hope[order] > ALIKE]])
 
 
 def _fit(gray: np.ndarray, dots: Dots | Fit, *, covariances: bool = True) -> Fit:
