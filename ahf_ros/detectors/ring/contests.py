@@ -83,10 +83,10 @@ def _odd(hypotheses: Hypotheses) -> np.ndarray:
 def resolve(hypotheses: Hypotheses, ids: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return which hypotheses to keep, and which of these stay certain, bool, shape (k,) each.
 
-    They come in the order of their evidence, the certain ones first; `ids` are equal where words
-    are the same. The best one of a dot is kept. Dots on the band of a certain target are its
-    sectors and are dropped. Certain stays what neither another reading of its dot, nor a target
-    whose band overlaps, nor another claim to its ID comes near to.
+    They come in the order of their confidence; `ids` are equal where words are the same. The best
+    one of a dot is kept. Dots on the band of a certain target are its sectors and are dropped.
+    Certain stays what neither another reading of its dot, nor a target whose band overlaps, nor
+    another claim to its ID comes near to.
     """
     marked, order = hypotheses.marked, np.arange(len(ids))
     on_it = on_targets(hypotheses, hypotheses.certain)

@@ -303,7 +303,7 @@ def report(
     hypotheses = settle_same_prints(hypotheses, settings.codes(Family))
     whole = whole[of_size]
     hypotheses = hypotheses.select(hypotheses.certain | whole)
-    hypotheses = hypotheses.select(np.lexsort((-hypotheses.marked, ~hypotheses.certain)))
+    hypotheses = hypotheses.select(np.argsort(-hypotheses.confidence, kind='stable'))
     names, codes, ids = decoded(hypotheses)
     keys = np.unique(
         [f'{name} {number}' for name, number in zip(names, ids, strict=True)], return_inverse=True
