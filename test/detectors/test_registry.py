@@ -126,7 +126,7 @@ def test_only_families_that_can_be_counted_are_estimated():
 def test_refinement_drafts_and_patience_are_part_of_the_contract(name):
     detector = made(name)
     assert isinstance(detector, Refiner) == (not name.endswith('_published') and name != 'command')
-    assert isinstance(detector, Drafter) == (name in ('traditional', *SQUARES))
+    assert isinstance(detector, Drafter) == (name in SQUARES)
     # Only detectors that hardly need a filter have a patience.
     assert isinstance(detector, EarlyStopping) == (name in ('ring', 'gsi', 'dots'))
 
