@@ -53,6 +53,7 @@ _RAYS = 48  # directions in which the edge of a dot is measured
 _SAMPLES = 10  # points on each edge of the band, a sector
 _MINIMUM_SHARE = 0.75  # of its edges, that a dot shows in their place
 _MINIMUM_PLACED = 0.85  # the same of a decoded target, with the edges of its band
+_THIN = 3.0  # width of a band, px, whose edges are too close to each other to be measured
 _PART = 1024  # dots measured at a time, which bounds the memory
 
 _DIRECTIONS = 12  # in which a sector is sampled
@@ -183,7 +184,9 @@ def _identify_dots(
     joint = fit_circles(gray, dots.frames, circles, reach=REACH, projective=True)
     good = joint.share >= _MINIMUM_PLACED
     fit = fit.replaced(decoded[good], joint.select(good))
-    ids[decoded[~good]] = UNDECODED
+    _, minor, _ = ellipse_axes(dots.frames)
+    thin = minor * (code.band_outer - code.band_inner) < _THIN
+    ids[decoded[~good & ~thin]] = UNDECODED
     major, _, _ = ellipse_axes(fit.frames)
     minimum, maximum = settings.radii
     shown = (minimum <= major) & (major <= maximum)
