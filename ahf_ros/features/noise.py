@@ -35,8 +35,11 @@ def reading_noise(gray: np.ndarray, frames: np.ndarray, radius: float) -> np.nda
     corners = np.rint(frame.project(frames, points)).astype(np.intp) - 1
     column, row = np.moveaxis(corners, -1, 0)
     row, column = np.clip(row, 0, height - 3), np.clip(column, 0, width - 3)
-    down, across = np.indices(_DIFFERENCE.shape).reshape(2, -1)
-    values = gray[row[..., None] + down, column[..., None] + across].astype(np.float32)
-    sizes = np.abs(values @ _DIFFERENCE.ravel())
-    noise: np.ndarray = medians(sizes) * (NORMAL * _INTERPOLATED / np.linalg.norm(_DIFFERENCE))
+    first, values = row * width + column, gray.ravel()
+    differences = np.zeros(first.shape, np.float32)
+    for (down, across), factor in np.ndenumerate(_DIFFERENCE):
+        differences += factor * values.take(first + (down * width + across))
+    noise: np.ndarray = medians(np.abs(differences)) * (
+        NORMAL * _INTERPOLATED / np.linalg.norm(_DIFFERENCE)
+    )
     return noise
