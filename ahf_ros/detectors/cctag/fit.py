@@ -75,7 +75,7 @@ class Fit:
     @property
     def of_centre(self) -> np.ndarray:
         """Covariance of the centre, px^2, (2, 2)."""
-        affine = frame.local_affine(self.formed.frame[None])[0]
+        affine = frame.local_affine(self.formed.frame)
         covariance = _OF_VARIANCE * affine @ self.covariance[:2, :2] @ affine.T
         of_centre: np.ndarray = covariance + _SYSTEMATIC**2 * np.eye(2)
         return of_centre

@@ -24,6 +24,7 @@ from ahf_ros.detectors.cctag.templates import (
     less_lines,
     size_steps,
     templates,
+    totals,
 )
 from ahf_ros.features import frame
 from ahf_ros.features.array_record import ArrayRecord
@@ -44,7 +45,6 @@ _OF_DISCS = 0.9  # of 1, so that of rings in one place those that leave least ar
 _LOOKED_AT = 2  # frames for an ID, at the most
 _APART = 0.1  # distance of the centres of different frames, radii
 _LEAST_UNLIKE = 1e-6  # of squares of gray values, of their mean
-_LEAST_TOTAL = 1e-9  # of squares of a weighted profile
 _READ = 128  # circles that are read at a time
 _PART = 4096  # circles that are looked at at a time, which bounds the memory
 LARGEST = 1 / 0.15
@@ -166,7 +166,7 @@ def _better(
     """
     of_rings, of_any_disc = _templates(family, size, edges)
     better = np.zeros(len(profiles))
-    total = np.maximum((profiles**2).sum(axis=1), np.float32(_LEAST_TOTAL))
+    total = totals(profiles)
     share = np.minimum((profiles @ of_rings.T).min(axis=1), 0) ** 2 / total  # ink is dark
     likely = np.flatnonzero(share >= _PROMISING)
     if not len(likely):

@@ -351,7 +351,7 @@ def likely_ids(
             if not len(some):
                 continue
             of_rings, tried = templates(family, step, prior.tried(polarity * of))
-            found = shares_of(profiles[some], of_rings, most=0)
+            found = shares_of(profiles[some], of_rings)
             found = found.reshape(len(some), -1, shape[2])
             of_each[some], edges_of_each[some] = found.max(axis=1), tried[found.argmax(axis=1)]
     rows = np.arange(len(frames))

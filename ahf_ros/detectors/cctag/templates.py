@@ -25,6 +25,7 @@ Below 0 it is clipped from bright ink, otherwise from bright paper.
 """
 
 
+_LEAST_TOTAL = 1e-9  # of squares of a weighted profile
 _USUAL_EDGE: Edge = (0.0, 0.9, 0.0, 0.0)
 CLIPPED = 0.25, 0.5
 """Shares of the contrast that over-exposure clips."""
@@ -57,15 +58,18 @@ def less_lines(profiles: np.ndarray, every: int = 1) -> np.ndarray:
     return weighted.astype(np.float32)
 
 
-def shares_of(profiles: np.ndarray, of_rings: np.ndarray, most: float = np.inf) -> np.ndarray:
-    """Return the shares of profiles (k, n) that templates (t, n) explain, shape (k, t).
+def shares_of(profiles: np.ndarray, of_rings: np.ndarray) -> np.ndarray:
+    """Return the shares of profiles (k, n) that templates of rings (t, n) explain, shape (k, t).
 
-    Both are weighted and less straight lines. The product of a template with what it explains is
-    at most so large; ink is below paper.
+    Both are weighted and less straight lines. Ink is below paper.
     """
-    total = np.maximum((profiles**2).sum(axis=1, keepdims=True), np.float32(1e-9))
-    shares: np.ndarray = np.minimum(profiles @ of_rings.T, np.float32(most)) ** 2 / total
+    shares: np.ndarray = np.minimum(profiles @ of_rings.T, 0) ** 2 / totals(profiles)[:, None]
     return shares
+
+
+def totals(profiles: np.ndarray) -> np.ndarray:
+    """Return the sums of squares of weighted profiles (k, n), of which shares are, shape (k,)."""
+    return np.maximum((profiles**2).sum(axis=1), np.float32(_LEAST_TOTAL))
 
 
 @lru_cache
