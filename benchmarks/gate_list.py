@@ -171,6 +171,7 @@ RING = [
         'detectors.ring.families:settle_same_prints',
         'lambda hypotheses, families: hypotheses',
     ),
+    Gate('words in another shape', 'detectors.ring.contests:_ODD', '1.0'),
     Gate('dots on bands', 'detectors.ring.contests:on_targets', _ON_DOT),
     Gate('bands that overlap', 'detectors.ring.contests:_ON_TOP', '0.0'),
     Gate('two claims to an ID or a dot', 'detectors.ring.contests:_CLEARLY', '0.0'),
