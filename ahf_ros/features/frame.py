@@ -131,8 +131,17 @@ def ellipse_axes(frames: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray
     They belong to the affine part of the frame at its centre: px, and rad in (-pi/2, pi/2] from
     +x towards +y.
     """
+    return axes_of(shapes(frames))
+
+
+def shapes(frames: np.ndarray) -> np.ndarray:
+    """Return the shapes of dots: squares of the affine parts of their frames, (k, 2, 2), px^2."""
     affine = local_affine(frames)
-    square = affine @ affine.transpose(0, 2, 1)
+    return affine @ affine.transpose(0, 2, 1)
+
+
+def axes_of(square: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the axes of dots as `ellipse_axes` does, from their `shapes`."""
     mean = (square[:, 0, 0] + square[:, 1, 1]) / 2
     difference = (square[:, 0, 0] - square[:, 1, 1]) / 2
     deviation = np.hypot(difference, square[:, 0, 1])
@@ -147,16 +156,15 @@ def mean_radii(frames: np.ndarray) -> np.ndarray:
 
 
 def local_affine(frames: np.ndarray) -> np.ndarray:
-    """Return the derivatives of the frames' maps at the centre, shape (k, 2, 2), px a radius."""
-    return frames[:, :2, :2] - frames[:, :2, 2:] * frames[:, 2:, :2]
+    """Return the derivatives of frames' maps at the centre, shape (..., 2, 2), px a radius."""
+    affine: np.ndarray = frames[..., :2, :2] - frames[..., :2, 2:] * frames[..., 2:, :2]
+    return affine
 
 
-def root(squares: np.ndarray) -> np.ndarray:
-    """Return the symmetric square roots of positive symmetric matrices, shape (k, 2, 2)."""
-    product = np.sqrt(np.linalg.det(squares))[:, None, None]
-    trace = np.trace(squares, axis1=1, axis2=2)[:, None, None]
-    roots: np.ndarray = (squares + product * np.eye(2)) / np.sqrt(trace + 2 * product)
-    return roots
+def nearest(frames: np.ndarray, others: np.ndarray, count: int) -> np.ndarray:
+    """Return which other dots have their centres nearest to those of dots, shape (k, count)."""
+    away = np.hypot(*(frames[:, :2, 2].T[..., None] - others[:, :2, 2].T[:, None]))
+    return np.argsort(away, axis=1, kind='stable')[:, :count]
 
 
 def shears(frames: np.ndarray, others: np.ndarray) -> np.ndarray:
@@ -164,7 +172,6 @@ def shears(frames: np.ndarray, others: np.ndarray) -> np.ndarray:
 
     It is the logarithm of the ratio of the axes of what circles of the others become here.
     """
-    affine, of_others = local_affine(frames)[:, None], local_affine(others.reshape(-1, 3, 3))
-    across = np.linalg.solve(of_others.reshape(*others.shape[:2], 2, 2), affine)
+    across = np.linalg.solve(local_affine(others), local_affine(frames)[:, None])
     stretched = np.linalg.svd(across, compute_uv=False)
     return np.asarray(np.log(stretched[..., 0] / stretched[..., 1]))

@@ -10,6 +10,7 @@ from ahf_ros.detectors.claims import Rivals, leading, owners
 from ahf_ros.detectors.ring.confidence import COVERED
 from ahf_ros.detectors.ring.decoding import CLEAR
 from ahf_ros.detectors.ring.hypotheses import Hypotheses
+from ahf_ros.detectors.ring.known import NEIGHBOURS
 from ahf_ros.features import frame
 
 _CLEARLY = 2.0  # times the evidence of another claim to the same ID or dot
@@ -18,7 +19,7 @@ _OTHER_COLOUR = 0.2  # of a foreign band, that a target of the other colour coun
 _ROUND = 0.6  # share of the edges of a word that are in their place, where there is a band
 _CODED = 5.0  # odds of words against arcs of any length, before any is read
 _OVERLAP = 0.92  # of the radii of two targets, at which the paper of one hides marks of the other
-_NEAR, _SHEAR = 5, 0.5  # certain targets beside one; ln of axes, by which all of them differ
+_SHEAR = 0.5  # ln of axes, by which a shape differs from those of all targets beside it
 _ODD = 10.0  # odds against a target in another shape than those beside it
 _ON_TOP = 3.0  # times as sure of its word as of what lies below it
 
@@ -70,12 +71,10 @@ def _among(
 def _odd(hypotheses: Hypotheses) -> np.ndarray:
     """Return whether certain hypotheses have another shape than all those beside, bool, (k,)."""
     odd, certain = np.zeros(len(hypotheses.frames), bool), np.flatnonzero(hypotheses.certain)
-    if len(certain) <= _NEAR:
+    if len(certain) <= NEIGHBOURS:
         return odd
     frames = hypotheses.frames[certain]
-    away = np.linalg.norm(frames[:, None, :2, 2] - frames[:, :2, 2], axis=2)
-    np.fill_diagonal(away, np.inf)
-    beside = np.argsort(away, axis=1, kind='stable')[:, :_NEAR]
+    beside = frame.nearest(frames, frames, NEIGHBOURS + 1)[:, 1:]  # the first one is itself
     odd[certain] = frame.shears(frames, frames[beside]).min(axis=1) > _SHEAR
     return odd
 

@@ -158,10 +158,25 @@ class _Seen:
         explained = Explained.joined([self.explained, Explained.by(read)])
         return _Seen((*self.found, read), explained)
 
+    @property
+    def targets(self) -> Explained:
+        """The certain targets that were read."""
+        return self.explained.select(self.explained.certain)
+
+    def left(self, dots: Fit, level: int) -> Fit:
+        """Return the dots of the image halved `level` times that lie on no certain target."""
+        return dots.select(~self.targets.on_them(dots.frames, level))
+
+    def with_targets(self, later: _Seen) -> _Seen:
+        """Return the same with what is certain of all that was read until `later`."""
+        seen = self
+        for read in later.found[len(self.found) :]:
+            seen = seen.after(read.select(read.certain))
+        return seen
+
     def prior(self, expected: frozenset[int], level: int) -> Prior:
         """Return what is known of targets in the image halved `level` times."""
-        shifts = self.explained.shifts[self.explained.certain]
-        return Prior.after(expected, shifts / 2**level)
+        return Prior.after(expected, self.targets.shifts / 2**level)
 
 
 def read_pyramid(
@@ -207,12 +222,15 @@ def read_pyramid(
             fits.append(dots)
         measured.append((octave, Fit.joined(fits)))
     for octave, dots in measured if shown else ():
-        seen = _read_alike(octave, images, dots, shown, seen, expected)
+        alike = seen.targets.alike(seen.left(dots, octave.level), octave.level)
+        if len(alike.frames):
+            alike = measure_alike(octave.pyramid.gray, alike, shown)
+            later = _read(octave, images, alike, shown, seen, expected, every=False)
+            seen = seen.with_targets(later)  # all else was read in the shape of the dots
     for octave, dots in measured:
         part = octave.pyramid.gray
         while True:
-            targets = seen.explained.select(seen.explained.certain)
-            rest = dots.select(~targets.on_them(dots.frames, octave.level))
+            rest = seen.left(dots, octave.level)
             left = [code for code in families if code not in shown]
             codes = further_families(part, rest, left)
             if not codes:
@@ -263,29 +281,6 @@ def _read(
                 rest = NO_FITS
             left[index] = rest
     return seen
-
-
-def _read_alike(
-    octave: Octave,
-    images: Sequence[np.ndarray],
-    dots: Fit,
-    codes: Sequence[Family],
-    seen: _Seen,
-    expected: frozenset[int],
-) -> _Seen:
-    """Return what is seen once dots that show no target are read in the shape of targets.
-
-    Only what is certain is added: all else was read in the dots' own shape.
-    """
-    targets = seen.explained.select(seen.explained.certain)
-    rest = dots.select(~targets.on_them(dots.frames, octave.level))
-    alike = targets.alike(rest, octave.level)
-    if not len(alike.frames):
-        return seen
-    alike = measure_alike(octave.pyramid.gray, alike, codes)
-    again = _read(octave, images, alike, codes, seen, expected, every=False)
-    new = [read.select(read.certain) for read in again.found[len(seen.found) :]]
-    return seen.after(Hypotheses.joined(new)) if new else seen
 
 
 def report(

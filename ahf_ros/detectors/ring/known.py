@@ -17,6 +17,9 @@ from ahf_ros.features.array_record import ArrayRecord
 from ahf_ros.features.circle_fit import NO_FITS, Fit
 from ahf_ros.features.robust import NORMAL
 
+NEIGHBOURS = 5
+"""Certain targets that tell the shape of one in their middle."""
+
 WHOLE = 0.9
 """Share of the edge of a dot that is explained, or reported, without a word."""
 
@@ -24,7 +27,6 @@ _AROUND = 0.25  # a whole dot without a word, where its own edge lies, dot radii
 _USUAL_DEVIATION = 1.0  # of the shift of edges of images, px
 _MINIMUM_DEVIATION = 0.3  # of targets of one image, which are not lit and printed alike, px
 _MINIMUM_TARGETS = 3  # certain targets that tell the shift of an image, and the shape of others
-_NEAR = 5  # certain targets that tell the shape of one
 _OF_SIZE = 1.25  # ratio of the radii of dots that may be targets of one size
 
 
@@ -96,13 +98,11 @@ class Explained(ArrayRecord):
             if len(known.frames) < _MINIMUM_TARGETS or not len(some.frames):
                 continue
             grown = 1 + polarity * known.shifts / frame.mean_radii(known.frames)
-            affine = frame.local_affine(frame.scaled(known.frames, grown)) / 2**level
-            centres = frame.enlarged(some.frames, level)[:, None, :2, 2]
-            away = np.hypot(*np.moveaxis(centres - known.frames[:, :2, 2], 2, 0))
-            near = np.argsort(away, axis=1, kind='stable')[:, :_NEAR]
-            squares = np.median((affine @ affine.transpose(0, 2, 1))[near], axis=1)
-            frames = some.frames.copy()
-            frames[:, :2, :2] = frame.root(squares)
+            shapes = frame.shapes(frame.scaled(known.frames, grown)) / 4**level
+            near = frame.nearest(frame.enlarged(some.frames, level), known.frames, NEIGHBOURS)
+            axes = frame.axes_of(np.median(shapes[near], axis=1))
+            x, y = some.frames[:, :2, 2].T
+            frames = frame.affine_frames(x, y, *axes)
             ratio = frame.mean_radii(frames) / some.size
             like = np.maximum(ratio, 1 / ratio) < _OF_SIZE
             found.append(replace(some, frames=frames).select(like))

@@ -246,12 +246,12 @@ def _unmixed(ratio: np.ndarray, first: np.ndarray, second: np.ndarray | float) -
     return np.asarray(np.maximum(ink, 1 / SATURATED))
 
 
-def _later(gap: np.ndarray, apart: np.ndarray) -> np.ndarray:
-    """Return the readings at angles that are far enough from those of readings (k, m, 2)."""
-    count = gap.shape[1]
+def _later(ground: np.ndarray, apart: np.ndarray) -> np.ndarray:
+    """Return the readings at angles that are far enough from those of readings (k, m, 4)."""
+    count = ground.shape[1]
     lags = np.clip(np.ceil(CORRELATION / np.maximum(apart, 1e-9)), 1, count // 4).astype(np.intp)
     later = (np.arange(count) + lags[:, None]) % count
-    return np.asarray(gap[np.arange(len(gap))[:, None], later])
+    return np.asarray(ground[np.arange(len(ground))[:, None], later])
 
 
 def _usual_levels(

@@ -92,8 +92,8 @@ def with_rims(dots: Dots, families: Sequence[Family], min_radius: float) -> Dots
     return Dots.joined(found)
 
 
-def measure_dots(gray: np.ndarray, dots: Dots, *, covariances: bool = False) -> Fit:
-    """Return the fits of dots."""
+def measure_dots(gray: np.ndarray, dots: Dots | Fit, *, covariances: bool = False) -> Fit:
+    """Return the fits of dots, whose blur is that of an earlier fit or the usual one."""
     parts = (dots.select(slice(start, start + PART)) for start in range(0, len(dots.frames), PART))
     return Fit.joined([NO_FITS, *(_fit(gray, part, covariances=covariances) for part in parts)])
 
@@ -112,8 +112,7 @@ def measure_likely(
         hope = hopes(gray, dots, families)
         others = dots.select(hope <= HOPEFUL)
         dots, hope = dots.select(hope > HOPEFUL), hope[hope > HOPEFUL]
-    parts = (dots.select(slice(start, start + PART)) for start in range(0, len(dots.frames), PART))
-    fit = Fit.joined([NO_FITS, *(_fit(gray, part) for part in parts)])
+    fit = measure_dots(gray, dots, covariances=True)
     order = np.argsort(-hope * fit.clearness**2, kind='stable')
     return fit.select(order[fit.share[order] >= ENOUGH]), others
 
@@ -123,7 +122,7 @@ def measure_alike(gray: np.ndarray, dots: Fit, families: Sequence[Family]) -> Fi
 
     Each has its own centre, or that of its edges in this shape, whichever gives more hope.
     """
-    fit = _fit(gray, dots)
+    fit = measure_dots(gray, dots, covariances=True)
     dots = replace(dots, covariance=fit.covariance)
     moved = replace(dots, frames=dots.frames.copy())
     moved.frames[:, :2, 2] = fit.frames[:, :2, 2]
@@ -136,8 +135,8 @@ def measure_alike(gray: np.ndarray, dots: Fit, families: Sequence[Family]) -> Fi
     return both.select(best[order[hope[order] > ALIKE]])
 
 
-def _fit(gray: np.ndarray, dots: Dots | Fit, *, covariances: bool = True) -> Fit:
-    """Return fits of dots, whose blur is that of an earlier fit or the usual one."""
+def _fit(gray: np.ndarray, dots: Dots | Fit, *, covariances: bool) -> Fit:
+    """Return the fits of as many dots as the memory is bounded to."""
     return fit_dots(
         gray,
         dots.frames,

@@ -15,6 +15,7 @@ import cv2
 import numpy as np
 
 from ahf_ros.features.array_record import ArrayRecord
+from ahf_ros.features.frame import local_affine
 
 SQUARE = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])
 """Corners of the square about the origin with sides of 1."""
@@ -87,8 +88,7 @@ def derivatives(frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     Distances from the camera change in shares of their own, in a side of the square; places in px.
     """
     scaled = frames / frames[:, 2:, 2:]
-    distances = scaled[:, 2, :2]
-    return distances, scaled[:, :2, :2] - scaled[:, :2, 2:] * distances[:, None]
+    return scaled[:, 2, :2], local_affine(scaled)
 
 
 def centre_covariance(frames: np.ndarray, normals: np.ndarray, sums: np.ndarray) -> np.ndarray:
