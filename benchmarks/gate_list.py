@@ -104,7 +104,6 @@ RING = [
     Gate('dots that are another one', 'features.dots:_SAME', '0.0'),
     Gate('edges of whole dots', 'detectors.ring.known:WHOLE', '2.0'),
     Gate('glance: low bounds', 'detectors.ring.proposals:HOPEFUL', _NEVER),
-    Gate('glance: low bounds in the shape of others', 'detectors.ring.proposals:ALIKE', _NEVER),
     Gate('other sizes than targets have', 'detectors.ring.known:_OF_SIZE', _EVERY),
     Gate('glance: holes', 'detectors.ring.proposals:_ALIKE', '0.0'),
     Gate('dots with few edges', 'features.circle_fit:ENOUGH', '0.0'),

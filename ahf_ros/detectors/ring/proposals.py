@@ -42,9 +42,6 @@ _ALIKE, _BEYOND = 0.15, 0.5  # difference of ln, and share of what is beyond, th
 HOPEFUL = 0.1
 """Bound of the mean evidence of a reading, from which a band is read."""
 
-ALIKE = 0.25
-"""The same of a dot in the shape of the targets about it, most of which have twice as much."""
-
 Print = tuple[tuple[float, float], int]
 """Radii of a band, in dot radii, and number of its sectors."""
 
@@ -132,7 +129,7 @@ def measure_alike(gray: np.ndarray, dots: Fit, families: Sequence[Family]) -> Fi
     best = hope.argmax(axis=0) * count + np.arange(count)
     hope = hope.max(axis=0)
     order = np.argsort(-hope * dots.clearness**2, kind='stable')
-    return both.select(best[order[hope[order] > ALIKE]])
+    return both.select(best[order[np.isfinite(hope[order])]])
 
 
 def _fit(gray: np.ndarray, dots: Dots | Fit, *, covariances: bool) -> Fit:
