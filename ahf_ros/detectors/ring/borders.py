@@ -15,7 +15,7 @@ from ahf_ros.codes.ring import Family
 from ahf_ros.detectors.ring.decoding import Words, bits_at
 from ahf_ros.detectors.ring.likelihood import normal
 from ahf_ros.detectors.ring.polar import DEPTHS, PolarImages
-from ahf_ros.features.robust import median
+from ahf_ros.features.robust import fit_linear, median
 from ahf_ros.imaging.logarithm import LOG_OFFSET
 
 _BESIDE = 3  # angles on either side of a border
@@ -23,6 +23,8 @@ _CONTRAST = 0.5  # share of the step of a mark, from which a border is seen
 _ERROR, _PIXELS = 0.15, 0.4  # standard deviation of the place of a border, angles and px
 _ANYWHERE = 0.1  # share of borders that light moves
 _UNSEEN = 2.3  # price of an end that is not seen, as of one that is anywhere
+_MOVED = 5.0  # price of a band that is not concentric with its dot
+_ROBUST = 0.5  # distance of ends, angles, of which a quarter is left
 _RARE = 12.0  # log odds of a cover against a word that no family has
 
 
@@ -69,8 +71,17 @@ def _ends(
     known[rows, places] = True
     away -= median(away, known, 0.0)[:, None]  # frames may be turned by a part of an angle
     error = np.hypot(_ERROR, _PIXELS * count / (np.pi * (inner + outer) * polar.size))[:, None]
-    odds = np.log((1 - _ANYWHERE) * normal(away, error) * _BESIDE + _ANYWHERE)
+    angles = 2 * np.pi / away.shape[1] * np.arange(away.shape[1])
+    moved = np.stack([np.ones(len(angles)), np.cos(angles), np.sin(angles)], axis=1)
+    _, beside = fit_linear(away, known.astype(float), moved, _ROBUST)
+    odds = np.maximum(_in_place(away, error, known), _in_place(beside, error, known) - _MOVED)
     steps = range(-_BESIDE, _BESIDE + 1)
     hidden = np.logical_or.reduce([np.roll(words.hidden, step, axis=1) for step in steps])
     unseen = np.count_nonzero(ends & ~hidden & ~known, axis=1)
-    return (odds * known).sum(axis=1), unseen
+    return odds, unseen
+
+
+def _in_place(away: np.ndarray, error: np.ndarray, known: np.ndarray) -> np.ndarray:
+    """Return the log odds of known ends in place against anywhere near, (k,), from errors (k, m)."""
+    odds = np.log((1 - _ANYWHERE) * normal(away, error) * _BESIDE + _ANYWHERE)
+    return np.asarray((odds * known).sum(axis=1))

@@ -9,6 +9,7 @@ odds against everything that is no target: bare paper, and arcs of ink of any le
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -28,6 +29,8 @@ _DRAW = 5.0  # lead of a word that is not expected, which is as good as none
 _NEAR = 3  # angles on either side of the clearest one
 _REFINED = 2  # best words, that compete at the phases beside theirs as well
 _PHASE = 0.6  # error of the phase of sectors, angles
+_ASIDE = np.radians([1.5, 2.25, 3.0, 3.75, 4.5])  # of bands along themselves beside their dots
+_SIDES = 8  # on which they are
 _NEVER = np.float32(-np.inf)
 
 COVER = 6.0
@@ -188,9 +191,10 @@ def decode(
         of_arcs, borders = _free_paths(turned)
         price = _of_borders(inked, mixed, hidden, borders, _border(turned), family)
         # Covers may be as long as they like, as arcs may.
-        clear, as_paper = (of[..., None] for of in of_word)
-        long = as_paper + np.float32(1 - _COVERED / _MORE) * more[:, None]
-        coded = _covered_paths(clear, long, turned)[:, 0].astype(np.float64) - of_arcs - price
+        moved = _moved(steps[rows, best], turned)
+        long = of_word[1] + np.float32(1 - _COVERED / _MORE) * more
+        of_lens = _covered_paths(moved[..., None], long[..., None], turned)[:, 0]
+        coded = of_lens.astype(np.float64) - of_arcs - price
     found = Words(
         words=of_best,
         starts=2 * np.pi * phase / angles,
@@ -375,6 +379,33 @@ def _along_words(evidence: Evidence, steps: np.ndarray) -> np.ndarray:
     count, bands, kinds = every.shape
     first = (np.arange(count * bands, dtype=np.int32) * kinds).reshape(count, bands, 1)
     return np.take(np.ascontiguousarray(every), first + steps.transpose(2, 0, 1))
+
+
+def _moved(steps: np.ndarray, of: Evidence) -> np.ndarray:
+    """Return the evidence for words whose bands are where they fit best beside their dots, (m, k).
+
+    From their `_steps`, (k, m).
+    """
+    here, before = _moves(steps.shape[1])
+    evidence = _along_words(of, (steps[:, here] + steps[:, before]) // 2)
+    best = evidence.sum(axis=0).argmax(axis=1)
+    return np.asarray(evidence[:, np.arange(len(steps)), best])
+
+
+@lru_cache(maxsize=32)
+def _moves(count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return the angles that bands beside their dots show at each one, int, (n, count).
+
+    They show what is between two, where they are moved by a half. The first one is not moved. A
+    lens distorts targets by a square, which moves a band along itself by a sine of the angle about
+    the dot, and what it does across a projective frame follows.
+    """
+    angles = 2 * np.pi / count * np.arange(count)
+    sides = 2 * np.pi / _SIDES * np.arange(_SIDES)[:, None]
+    moves = np.multiply.outer(np.concatenate([[0], _ASIDE]), np.sin(angles - sides))
+    halves = np.unique(np.rint(moves.reshape(-1, count) * count / np.pi).astype(int), axis=0)
+    here = np.arange(count) - halves // 2
+    return here % count, (here - halves % 2) % count
 
 
 def _covered_paths(seen: np.ndarray, as_paper: np.ndarray, of: Evidence) -> np.ndarray:
