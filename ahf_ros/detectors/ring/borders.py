@@ -2,7 +2,8 @@
 
 The readings of a band find a border to one angle. The share of the band beside it that is dark
 tells its place to a small part of that, whatever the blur. Arcs of any length, and those of
-another number of sectors, end anywhere.
+another number of sectors, end anywhere. A lens that bends a target moves its band beside its dot,
+and the ends by a sine of their direction.
 """
 
 from __future__ import annotations
@@ -71,8 +72,8 @@ def _ends(
     known[rows, places] = True
     away -= median(away, known, 0.0)[:, None]  # frames may be turned by a part of an angle
     error = np.hypot(_ERROR, _PIXELS * count / (np.pi * (inner + outer) * polar.size))[:, None]
-    angles = 2 * np.pi / away.shape[1] * np.arange(away.shape[1])
-    moved = np.stack([np.ones(len(angles)), np.cos(angles), np.sin(angles)], axis=1)
+    angles = 2 * np.pi / count * np.arange(count)
+    moved = np.stack([np.ones(count), np.cos(angles), np.sin(angles)], axis=1)
     _, beside = fit_linear(away, known.astype(float), moved, _ROBUST)
     odds = np.maximum(_in_place(away, error, known), _in_place(beside, error, known) - _MOVED)
     steps = range(-_BESIDE, _BESIDE + 1)
@@ -82,6 +83,9 @@ def _ends(
 
 
 def _in_place(away: np.ndarray, error: np.ndarray, known: np.ndarray) -> np.ndarray:
-    """Return the log odds of known ends in place against anywhere near, (k,), from errors (k, m)."""
+    """Return the log odds that known ends are in place, against anywhere near, shape (k,).
+
+    From how far away they are, (k, m), and the error of that.
+    """
     odds = np.log((1 - _ANYWHERE) * normal(away, error) * _BESIDE + _ANYWHERE)
     return np.asarray((odds * known).sum(axis=1))

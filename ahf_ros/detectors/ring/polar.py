@@ -49,6 +49,9 @@ _UNLIKE = 4.0  # standard deviations of ground, from which a level is unlike the
 _LIGHT = 0.34  # share of the ground that is darker, or has edges, from which that is light
 _GLARE_EDGES = 0.03  # share of the ground, more than edges of glare have
 _WHITE_OUT = 0.6  # share of the ground that is saturated, from which that is no glare
+_SOFT, _ASIDE = 1.6, 0.15  # distance from an edge at which it ends, blurs and dot radii
+_STRAY = 0.03  # share of readings that are bright in a gap that is dark
+_FRAMED = 0.5  # share of directions, from which the ground ends in what is as bright as ink
 _NO_GLARE = 256.0  # more than any gray value
 
 
@@ -63,7 +66,7 @@ class PolarImages(ArrayRecord):
     row : ndarray of int, shape (k,)
         Which of these images is that of a dot.
     reach : ndarray of float64, shape (k, m)
-        Up to which radius the image shows the target at an angle, dot radii.
+        Up to which radius the image shows the target and its ground at an angle, dot radii.
     outermost : ndarray of float64, shape (k,)
         Radius of the last circle, dot radii.
     polarity : ndarray of int, shape (k,)
@@ -298,6 +301,36 @@ def _reach(
     points = frame.project(frames[border], frame.circle_points(angles, radii))
     reach[border] = np.where(within(points, shape), radii, 0).max(axis=2)
     return reach
+
+
+def on_dark_ground(polar: PolarImages, band: tuple[float, float]) -> PolarImages:
+    """Return polar images in which bright targets reach as far as the dark ground about them.
+
+    Where the gap is dark all around and most directions are as bright as ink beyond the band, the
+    ground ends there: it was a square that is little larger than the band, on white paper.
+    """
+    inner, outer = band
+    bright = np.flatnonzero(polar.polarity < 0)
+    if not bright.size:
+        return polar
+    some = polar.select(bright)
+    gap = some.at(np.tile(1 + (inner - 1) * GAP, (len(bright), 1)).T).swapaxes(0, 1)
+    gap = gap.reshape(len(bright), -1)
+    limit = medians(gap) / np.sqrt(some.contrast)
+    farthest = some.gray[some.row, :, -1]
+    framed = (gap < limit[:, None]).mean(axis=1) > 1 - _STRAY
+    framed &= (farthest >= limit[:, None]).mean(axis=1) > _FRAMED
+    if not framed.any():
+        return polar
+    bright, some, limit = bright[framed], some.select(framed), limit[framed, None, None]
+    aside = (_SOFT * some.blur / some.size)[:, None]
+    beyond = some.radii >= outer + np.maximum(aside, _ASIDE)
+    white = (some.gray[some.row] >= limit) & beyond[:, None]
+    first = np.take_along_axis(some.radii, white.argmax(axis=2), axis=1)
+    until = np.where(white.any(axis=2), np.maximum(first - aside, outer), np.inf)
+    reach = polar.reach.copy()
+    reach[bright] = np.minimum(reach[bright], until)
+    return replace(polar, reach=reach)
 
 
 def _along(of_targets: np.ndarray, values: np.ndarray) -> np.ndarray:

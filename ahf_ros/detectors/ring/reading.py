@@ -38,6 +38,7 @@ from ahf_ros.detectors.ring.polar import (
     PART,
     PolarImages,
     angles_of,
+    on_dark_ground,
     polar_images,
 )
 from ahf_ros.features import frame
@@ -80,6 +81,7 @@ def _read_part(
         return unread
     hopeful = HOPEFUL * min(1.0, least_marked(family) / FEW_MARKS)
     polar = polar_images(gray, dots, family.band, family.bits * PER_SECTOR)
+    polar = on_dark_ground(polar, family.band)
     growth = best_growth(polar, family.band, prior)
     edges = edge_evidence(polar, 1 - growth, growth, family.band, SHARES)
     words = decode(edges, _overhang(growth, family), family, prior.expected, looks=False)
@@ -101,7 +103,8 @@ def _read_part(
     fit = _joint_fit(gray, printed, words, PER_SECTOR // 2, 1, family)
     fit = _by_dot(fit, printed, growth, _thin(printed, growth, family))
     growth = fit.polarity * fit.edge_shift / fit.size
-    polar = polar_images(gray, fit, family.band, family.bits * PER_SECTOR)
+    whole = polar_images(gray, fit, family.band, family.bits * PER_SECTOR)
+    polar = on_dark_ground(whole, family.band)
     edges = edge_evidence(polar, np.ones(len(read)), growth, family.band, SHARES)
     words = decode(edges, _overhang(growth, family), family, prior.expected)
     # What is seen against anything is that of edges alone, whatever else there is.
@@ -111,12 +114,12 @@ def _read_part(
         return unread
     if asked.size < read.size:
         read, growth = read[asked], growth[asked]
-        fit, polar = fit.select(asked), polar.select(asked)
+        fit, polar, whole = fit.select(asked), polar.select(asked), whole.select(asked)
         edges, words = edges.select(asked), words.select(asked)
     overhang = _overhang(growth, family)
     words = _settled(gray, fit, polar, edges, words, growth, family, prior.expected, last=True)
     words = with_ends(polar, words, overhang, family)
-    words = replace(words, unlike=unlike_print(polar, words, growth, overhang, family))
+    words = replace(words, unlike=unlike_print(whole, words, growth, overhang, family))
     good = _mean_odds(words, edges.weight) > hopeful
     if not good.any():
         return unread

@@ -1,0 +1,52 @@
+"""Bright ring targets on dark squares that end where the band does, on white paper."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+
+from ahf_ros.codes.ring import family
+from ahf_ros.detectors import create_detector
+
+WHITE, BLACK = 0.7, 0.05  # reflectances
+RADIUS, PITCH = 6.5, 72  # of dots, and between targets, px
+SQUARE = 1.06  # half of its side over the radius of the band
+FINE = 8  # samples across a pixel
+ROWS, COLUMNS = 3, 4
+
+
+def photograph(seed: int) -> tuple[np.ndarray, list[int]]:
+    """Return an image as of a phone, which sharpens, of turned targets, and their IDs."""
+    generator, code = np.random.default_rng(seed), family('cct12')
+    inner, outer = code.band
+    image = np.full((ROWS * PITCH * FINE, COLUMNS * PITCH * FINE), WHITE)
+    numbers = generator.choice(len(code.words), ROWS * COLUMNS, replace=False)
+    across = (np.arange(PITCH * FINE) + 0.5) / FINE - PITCH / 2
+    for place, number in enumerate(numbers):
+        row, column = divmod(place, COLUMNS)
+        turn, (right, down) = generator.uniform(0, 2 * np.pi), generator.uniform(-2, 2, 2)
+        x, y = np.meshgrid((across - right) / RADIUS, (across - down) / RADIUS)
+        x, y = x * np.cos(turn) - y * np.sin(turn), x * np.sin(turn) + y * np.cos(turn)
+        sector = (np.arctan2(-y, x) % (2 * np.pi) / (2 * np.pi) * code.bits).astype(
+            int
+        ) % code.bits
+        radius = np.hypot(x, y)
+        band = (radius > inner) & (radius < outer) & (code.words[number] >> sector & 1 == 1)
+        dark = np.maximum(np.abs(x), np.abs(y)) < SQUARE * outer
+        where = np.s_[row * PITCH * FINE :, column * PITCH * FINE :]
+        part = image[where][: PITCH * FINE, : PITCH * FINE]
+        part[dark & ~band & (radius > 1)] = BLACK
+    light = image.reshape(ROWS * PITCH, FINE, COLUMNS * PITCH, FINE).mean(axis=(1, 3))
+    light = cv2.GaussianBlur(light, (0, 0), 0.8)
+    gray = 255 * light ** (1 / 2.2)
+    gray += 0.8 * (gray - cv2.GaussianBlur(gray, (0, 0), 1.2))
+    gray += generator.normal(0, 1.5, gray.shape)
+    return np.clip(np.rint(gray), 0, 255).astype(np.uint8), sorted(
+        code.numbers[of] for of in numbers
+    )
+
+
+def test_targets_are_read_whose_dark_ground_ends() -> None:
+    image, numbers = photograph(5)
+    found = [target.id for target in create_detector(family='cct12')(image)]
+    assert sorted(found) == numbers
