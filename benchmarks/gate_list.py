@@ -258,6 +258,7 @@ CCTAG = [
     Gate('glance: little explained', 'detectors.cctag.glance:_PROMISING', '0.0'),
     Gate('glance: worse frames', 'detectors.cctag.glance:_LOOKED_AT', '8'),
     Gate('glance: frames alike', 'detectors.cctag.glance:_APART', '0.0'),
+    Gate('rays that differ much', 'detectors.cctag.detector:_ALIKE', '-1.0'),
     Gate('rays that differ', 'detectors.cctag.rings:_SHARED', '-1.0'),
     Gate('rings worse explained', 'detectors.cctag.rings:_CLEARLY', '1.0'),
     Gate('means that no ID explains', 'detectors.cctag.rings:_ALIKE', '-1e9'),

@@ -21,7 +21,7 @@ from ahf_ros.codes import CCTAG_NAMES
 from ahf_ros.codes.cctag import CircleFamily, circle_family
 from ahf_ros.detectors.cctag.glance import LARGEST, Circles, likely_rings
 from ahf_ros.detectors.cctag.joint import contested, jointly
-from ahf_ros.detectors.cctag.light import EDGES, Lights
+from ahf_ros.detectors.cctag.light import EDGES, Lights, shares_alike
 from ahf_ros.detectors.cctag.rays import is_drawing, of_drawing
 from ahf_ros.detectors.cctag.rings import (
     Aligned,
@@ -59,6 +59,7 @@ _CLEAR_OF_RIVALS = 19.0  # odds of the place of an ID against all others
 _SURE = 0.999  # confidence of targets that neither rivals nor another family put in doubt
 _PROBABLE = 0.5  # confidence of targets that tell of edges together
 _POSSIBLE = 0.01  # probability of a target, from which it is read again
+_ALIKE = 0.25  # share of what rays show, the same on all in light without edges
 _IN_A_ROW = 32  # likely frames without a target, which hardly any others precede
 _FULL, _HALVES = slice(1), slice(1, None)  # of octaves, whose images are read at once
 _BORDER = 160  # px, beyond an image, farther than circles about frames in it reach
@@ -202,7 +203,8 @@ def _first_lights(
 ) -> list[list[Lights]]:
     """Return light of one edge about the first frames of all kinds in images.
 
-    Frames that do not show the same all around have none. The images are read as one.
+    Frames that do not show the same all around have none, nor those that no edge of light could
+    make do so. The images are read as one.
     """
     if not images:
         return []
@@ -211,14 +213,17 @@ def _first_lights(
         [frame.translated(it[:_IN_A_ROW], *place) for it in of]
         for place, of in zip(places, frames, strict=True)
     ]
-    lights = Lights.about(stacked, np.concatenate([it for of in first for it in of]), 1)
-    same, start = show_the_same(stacked, lights), 0
+    every = np.concatenate([it for of in first for it in of])
+    some = np.flatnonzero(shares_alike(stacked, every) >= _ALIKE)
+    lights = Lights.about(stacked, every[some], 1)
+    same = show_the_same(stacked, lights)
+    lights, rows, start = lights.select(same), some[same], 0
     found: list[list[Lights]] = []
     for (x, y), of in zip(places, first, strict=True):
         found.append([])
         for it in of:
-            some = start + np.flatnonzero(same[start : start + len(it)])
-            found[-1].append(lights.select(some).translated(-x, -y))
+            own = slice(*np.searchsorted(rows, (start, start + len(it))))
+            found[-1].append(lights.select(own).translated(-x, -y))
             start += len(it)
     return found
 

@@ -23,12 +23,14 @@ from ahf_ros.detectors.cctag.rays import (
     Seen,
     clipped,
 )
+from ahf_ros.detectors.cctag.templates import less_lines
 from ahf_ros.features import frame
 from ahf_ros.features.array_record import ArrayRecord
 from ahf_ros.features.normal import normal_integral
 from ahf_ros.features.sampling import sample_circles
 
-_ANGLES, _RADII = ANGLES[::2], PROFILE[::2].astype(np.float32)
+_EVERY = 2  # one of so many angles and radii is looked at
+_ANGLES, _RADII = ANGLES[::_EVERY], PROFILE[::_EVERY].astype(np.float32)
 _STEP = float(_RADII[1] - _RADII[0])
 _X, _Y = (np.outer(of(_ANGLES), _RADII).astype(np.float32) for of in (np.cos, np.sin))
 _MOVES = (0, 1, 3, 4)  # of a frame, that change what is on a circle
@@ -41,6 +43,7 @@ _LENS = 0.88  # blur after light and ink have met, and of interpolation, px
 _FEW = np.s_[..., ::2]  # radii, for a first look
 _PAPER = 2 * int(np.searchsorted(_RADII[_FEW], 1.16))  # radii from there on show plain paper
 _SIZES = 1.1  # ratio of radii that share the edges of a first look
+_SHARPEST_FROM = math.ceil(math.log(_WIDTH / _SHARPEST) / math.log(_SIZES))  # step of radii
 _OFFSETS = np.arange(-1.2, 1.21, 0.1)
 _STRAIGHT, _CURVED, _CURVATURE = 16, 24, 0.7
 _FIRST = 12  # edges that are tried with all others
@@ -144,6 +147,22 @@ def lit(gray: np.ndarray, frames: np.ndarray, lights: Lights) -> Seen:
     variance = (away**2 * between * (1 - between)).sum(axis=-1)
     mixed[many] = variance / ((apart * step)[many, None, None]) ** 2
     return Seen(values / light, lowest, highest, many, apart.astype(int), mixed)
+
+
+def shares_alike(gray: np.ndarray, frames: np.ndarray) -> np.ndarray:
+    """Return the shares of what rays show that are the same on all, in light without edges, (k,).
+
+    The frames, (k, 3, 3), are known to about a tenth, as for `Lights.about`.
+    """
+    if not len(frames):
+        return np.zeros(0)
+    scene = _Scene.of(gray, frames, frame.mean_radii(frames))
+    slopes = scene.fit(np.zeros((len(frames), 0, 5))).heights.astype(np.float32)[..., None, None]
+    values = np.exp(scene.seen - slopes[:, 0] * _X - slopes[:, 1] * _Y)
+    values /= values.mean(axis=2, keepdims=True)
+    means, rays = less_lines(values.mean(axis=1), _EVERY), less_lines(values, _EVERY)
+    shares: np.ndarray = (means**2).sum(axis=1) / (rays**2).sum(axis=2).mean(axis=1)
+    return shares
 
 
 @dataclass(frozen=True, slots=True)
@@ -260,7 +279,7 @@ class _Scene(ArrayRecord):
 def _first_look(rest: np.ndarray, size: np.ndarray, count: int) -> np.ndarray:
     """Return the best one or two of some edges for what is left, shape (k, count, 5)."""
     best = np.empty((len(rest), count, 5))
-    sizes = np.rint(np.log(size) / np.log(_SIZES)).astype(int)
+    sizes = np.minimum(np.rint(np.log(size) / np.log(_SIZES)).astype(int), _SHARPEST_FROM)
     left = (rest[_FEW] * np.sqrt(_RADII[_FEW])).reshape(len(rest), -1)
     for step in np.unique(sizes).tolist():
         edges, steps = _first_edges(step)
