@@ -10,7 +10,12 @@ import pytest
 
 from ahf_ros.codes.gsi import GSI_LIBRARY, point_family, positions_of, value_of
 from ahf_ros.detectors import create_detector
-from ahf_ros.detectors.gsi.evidence import Evidence, read_codes, seen_templates
+from ahf_ros.detectors.gsi.evidence import (
+    Evidence,
+    find_evidence,
+    likely_templates,
+    read_codes,
+)
 from ahf_ros.detectors.gsi.grouping import Templates
 from ahf_ros.drawing.overlay import DECODED_COLOUR, DECODING_DOT_COLOUR, draw
 from ahf_ros.features.homography import fit_homographies
@@ -165,7 +170,47 @@ def test_a_dot_that_was_found_may_be_hidden_and_one_that_was_not_found_may_not()
         misfit=np.zeros(2),
     )
     log = image_pyramid(image, 60.0).logs[0]
-    assert seen_templates(log, unseen, family).members.tolist() == [[*range(count)]]
+    likely, _ = likely_templates(log, unseen, family, 0.75)
+    assert likely.members.tolist() == [[*range(count)]]
+
+
+def test_templates_that_are_left_out_have_no_code_with_the_support() -> None:
+    shown = scene(light='lattice', ambient=0.3)
+    family = point_family()
+    count = len(family.template)
+    random = np.random.default_rng(7)
+    centres = np.array([it.dots for it in detect(shown.image)])[:, :count, :2]
+    moved = [centres + random.normal(0, error, centres.shape) for error in (0.0, 1.0, 2.0, 4.0)]
+    centres = np.concatenate(moved * 5)
+    ones = np.ones(centres.shape[:2])
+    kind = {
+        'homographies': fit_homographies(
+            family.places[:count], centres, ones, family.reach
+        ).homographies,
+        'polarity': np.ones(len(centres), int),
+        'scale': random.uniform(0.5, 2.5, len(centres)),
+    }
+    some = Templates(
+        **kind,
+        members=np.tile(np.arange(count), (len(centres), 1)),
+        misfit=random.uniform(size=len(centres)),
+    )
+    log = image_pyramid(shown.image, 60.0).logs[0]
+    every, _ = likely_templates(log, some, family, -np.inf)
+    kept, evidence = likely_templates(log, some, family, 0.75)
+    support = read_codes(find_evidence(log, **_places(every), family=family), every.scale, family)
+    enough = support.support >= 0.75
+    assert np.isin(every.misfit[enough], kept.misfit).all()
+    assert enough.any()
+    assert len(kept.misfit) < len(every.misfit)
+    whole = find_evidence(log, **_places(kept), family=family)
+    np.testing.assert_array_equal(evidence.ratio, whole.ratio)
+    np.testing.assert_array_equal(evidence.inside, whole.inside)
+
+
+def _places(of: Templates) -> dict[str, np.ndarray]:
+    """Return where the targets of templates are."""
+    return {'homographies': of.homographies, 'polarity': of.polarity, 'scale': of.scale}
 
 
 def test_targets_in_deep_lattices_are_read() -> None:

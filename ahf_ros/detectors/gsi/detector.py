@@ -20,7 +20,7 @@ from ahf_ros.blas import one_blas_thread
 from ahf_ros.codes.gsi import PointFamily
 from ahf_ros.detectors.claims import best_targets
 from ahf_ros.detectors.contract import DetectorSettings, FamilyDetector, moved_targets
-from ahf_ros.detectors.gsi.evidence import find_evidence, read_codes, seen_templates
+from ahf_ros.detectors.gsi.evidence import find_evidence, likely_templates, read_codes
 from ahf_ros.detectors.gsi.grouping import FEW, Templates, find_templates
 from ahf_ros.detectors.gsi.hypotheses import (
     NO_HYPOTHESES,
@@ -28,6 +28,7 @@ from ahf_ros.detectors.gsi.hypotheses import (
     Hypotheses,
     confidence_features,
     inside,
+    least_support,
     plausible,
     resolve,
 )
@@ -173,12 +174,10 @@ def read_targets(
 def _read(
     pyramid: ImagePyramid, templates: Templates, code: PointFamily, *, obvious: bool
 ) -> Hypotheses:
-    templates = seen_templates(pyramid.logs[0], templates, code)
+    least = least_support(obvious=obvious)
+    templates, evidence = likely_templates(pyramid.logs[0], templates, code, least)
     if not len(templates.polarity):
         return NO_HYPOTHESES
-    evidence = find_evidence(
-        pyramid.logs[0], templates.homographies, templates.polarity, templates.scale, code
-    )
     readings = read_codes(evidence, templates.scale, code)
     which = plausible(templates, readings, code, obvious=obvious)
     if not len(which):

@@ -120,6 +120,11 @@ def probability(features: np.ndarray) -> np.ndarray:
     return logistic(features, _OF_TARGET)
 
 
+def least_support(*, obvious: bool) -> float:
+    """Return the support of groups from which they are followed up."""
+    return _CLEAR if obvious else _PLAUSIBLE
+
+
 def plausible(
     templates: Templates, readings: Readings, family: PointFamily, *, obvious: bool
 ) -> np.ndarray:
@@ -130,7 +135,7 @@ def plausible(
     """
     rank = readings.support - _MISFIT * templates.misfit
     order = np.argsort(-rank, kind='stable')
-    order = order[readings.support[order] >= (_CLEAR if obvious else _PLAUSIBLE)]
+    order = order[readings.support[order] >= least_support(obvious=obvious)]
     equal = family.template_radii[family.reference] * _EQUAL
     units = reference_frames(templates.homographies[order], float(equal))
     around = reference_frames(templates.homographies[order], family.reach * _APART)
