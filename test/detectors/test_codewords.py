@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from ahf_ros.codes.cyclic import rotated_words
 from ahf_ros.codes.ring import canonical, family, sectors
 from ahf_ros.detectors.ring.codewords import (
     COMPETITORS,
@@ -73,3 +74,17 @@ def test_the_likeliest_bits_are_those_of_all_that_have_most_evidence() -> None:
     bits, highest = likeliest_bits(ones, pairs)
     assert np.allclose(highest, scores.max(axis=1))
     assert np.array_equal(bits, every[scores.argmax(axis=1)])
+
+
+@pytest.mark.parametrize('name', ['cct16', 'metashape20'])
+def test_of_many_words_those_near_to_the_evidence_compete(name: str) -> None:
+    code = family(name)
+    says = np.random.default_rng(8).normal(0, 3, (20, PHASES, code.bits))
+    words, phases = best_words(says, 0 * says, code)
+    assert (code.ids(words) > 0).all()
+    assert [len(np.unique(of)) for of in words] == [COMPETITORS] * len(words)
+    every = np.unique([rotated_words(code.words, turn, code.bits) for turn in range(code.bits)])
+    shown = (every >> np.arange(code.bits)[:, None] & 1).astype(np.float32)
+    highest = (says.astype(np.float32) @ shown).max(axis=(1, 2))
+    of_best = says[np.arange(20), phases[:, 0]] * (words[:, :1] >> np.arange(code.bits) & 1)
+    assert of_best.sum(axis=1) == pytest.approx(highest, abs=0.02)

@@ -145,14 +145,32 @@ def _near_rotations(
 
     Those that are expected compete as well.
     """
-    uncertain = np.argsort(np.abs(sectors), axis=1)[:, :_UNCERTAIN]
+    # In ascending order, the words of a phase ascend, which makes sorting fast.
+    uncertain = np.sort(np.argsort(np.abs(sectors), axis=1)[:, :_UNCERTAIN], axis=1)
     certain = (sectors > 0) @ (1 << np.arange(family.bits)) & ~(1 << uncertain).sum(axis=1)
-    choices = np.arange(1 << _UNCERTAIN)[:, None] >> np.arange(_UNCERTAIN) & 1
-    words = np.unique(certain[:, None] + (1 << uncertain) @ choices.T)
-    valid = words[family.ids(words) > 0]
+    words = (certain[:, None] + (1 << uncertain) @ _choices()).ravel()
+    valid = words[_are_words(family)[words]]
     # At least two words have to compete.
     words = np.concatenate([valid, family.words[:2], _expected_rotations(family, expected)])
-    return _with_bits(np.unique(words), family.bits)
+    words.sort(kind='stable')
+    new = np.ones(len(words), bool)
+    np.not_equal(words[1:], words[:-1], out=new[1:])
+    return _with_bits(words[new], family.bits)
+
+
+@cache
+def _choices() -> np.ndarray:
+    """Return all choices of uncertain bits, ascending, (uncertain, choices)."""
+    return np.arange(1 << _UNCERTAIN) >> np.arange(_UNCERTAIN)[:, None] & 1
+
+
+@lru_cache(maxsize=8)
+def _are_words(family: Family) -> np.ndarray:
+    """Return whether numbers are rotations of words, (2^bits,)."""
+    words = np.zeros(1 << family.bits, bool)
+    for turn in range(family.bits):
+        words[rotated_words(family.words, turn, family.bits)] = True
+    return words
 
 
 @lru_cache(maxsize=8)
