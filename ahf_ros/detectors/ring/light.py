@@ -27,7 +27,7 @@ _SHIFTS = 60  # best ones, that predict
 _ALIKE = 1.1  # ratio of differences of shifts that are as good as each other
 _UNKNOWN = 0.03  # weight of ground below which less than two of the shifts predict a point
 _ROUNDING = 1e-5  # square of ln by which whole gray values near 90 differ, without any noise
-_PART = 64  # targets at a time, which bounds the memory
+_PART = 32  # targets at a time, whose transforms stay in the cache
 
 
 def predicted_light(
