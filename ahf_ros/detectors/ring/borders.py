@@ -72,14 +72,23 @@ def _ends(
     known[rows, places] = True
     away -= median(away, known, 0.0)[:, None]  # frames may be turned by a part of an angle
     error = np.hypot(_ERROR, _PIXELS * count / (np.pi * (inner + outer) * polar.size))[:, None]
-    angles = 2 * np.pi / count * np.arange(count)
-    moved = np.stack([np.ones(count), np.cos(angles), np.sin(angles)], axis=1)
-    _, beside = fit_linear(away, known.astype(float), moved, _ROBUST)
-    odds = np.maximum(_in_place(away, error, known), _in_place(beside, error, known) - _MOVED)
+    odds = _in_place(away, error, known)
+    moved = np.flatnonzero(_in_place(0 * away, error, known) - odds > _MOVED)
+    if moved.size:
+        some = known[moved]
+        beside = _beside(away[moved], some)
+        odds[moved] = np.maximum(odds[moved], _in_place(beside, error[moved], some) - _MOVED)
     steps = range(-_BESIDE, _BESIDE + 1)
     hidden = np.logical_or.reduce([np.roll(words.hidden, step, axis=1) for step in steps])
     unseen = np.count_nonzero(ends & ~hidden & ~known, axis=1)
     return odds, unseen
+
+
+def _beside(away: np.ndarray, known: np.ndarray) -> np.ndarray:
+    """Return how far known ends are away from those of bands beside their dots, all (k, m)."""
+    angles = 2 * np.pi * np.arange(away.shape[1]) / away.shape[1]
+    sides = np.stack([np.ones_like(angles), np.cos(angles), np.sin(angles)], axis=1)
+    return fit_linear(away, known.astype(float), sides, _ROBUST)[1]
 
 
 def _in_place(away: np.ndarray, error: np.ndarray, known: np.ndarray) -> np.ndarray:

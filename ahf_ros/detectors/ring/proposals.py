@@ -115,7 +115,7 @@ def measure_likely(
 
 
 def measure_alike(gray: np.ndarray, dots: Fit, families: Sequence[Family]) -> Fit:
-    """Return the dots whose bands are worth reading in their shapes, the most hopeful ones first.
+    """Return the dots whose bands give any hope in their shapes, the most hopeful ones first.
 
     Each has its own centre, or that of its edges in this shape, whichever gives more hope.
     """
@@ -129,7 +129,7 @@ def measure_alike(gray: np.ndarray, dots: Fit, families: Sequence[Family]) -> Fi
     best = hope.argmax(axis=0) * count + np.arange(count)
     hope = hope.max(axis=0)
     order = np.argsort(-hope * dots.clearness**2, kind='stable')
-    return both.select(best[order[np.isfinite(hope[order])]])
+    return both.select(best[order[hope[order] > 0]])
 
 
 def _fit(gray: np.ndarray, dots: Dots | Fit, *, covariances: bool) -> Fit:
