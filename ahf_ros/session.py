@@ -144,6 +144,7 @@ def _identifier(
         patience=used.patience if isinstance(used, EarlyStopping) else 0,
         mirrored=lambda target: mirrored_number(target.family, target.code),
         name=f'detector {used.name!r}' if isinstance(used, Detector) else 'detector',
+        looked_for=used.family if isinstance(used, Detector) else '',
         **more,
     )
 

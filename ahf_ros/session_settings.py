@@ -8,11 +8,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from ahf_ros.codes.families import AUTO
 from ahf_ros.detectors import DETECTOR, DetectorSettings, detector_name, estimator
 from ahf_ros.filtering.settings import AdaptiveSettings
 from ahf_ros.imaging import MAXIMUM_IMAGES
-from ahf_ros.settings.parameter import check_parameters, parameter, parameters
+from ahf_ros.settings.parameter import check_parameters, parameter
 from ahf_ros.text import counted
 
 MAXIMUM_TARGETS = 100_000
@@ -88,16 +87,6 @@ class IdentificationSettings:
     def check_detector(self) -> None:
         """Refuse a detector that does not identify the family."""
         detector_name(self.detector, self.detection.family, self.detection.family_file)
-
-
-_FAMILY = next(item for item in parameters(DetectorSettings) if item.name == 'family')
-
-
-@dataclass(frozen=True, slots=True)
-class AnyTargetSettings(DetectorSettings):
-    """The same for commands and nodes, where all families are looked for by default."""
-
-    family: str = parameter(AUTO, _FAMILY.description, form=_FAMILY.form)
 
 
 @dataclass(frozen=True, slots=True)

@@ -129,7 +129,7 @@ class Stream(Generic[Item]):
     --------
     >>> from ahf_ros import SceneSettings, create_detector, render
     >>> settings = IdentificationSettings(expected_targets=3)
-    >>> stream = Stream(settings, StackSettings(), create_detector('ring'))
+    >>> stream = Stream(settings, StackSettings(), create_detector(family='metashape12'))
     >>> image = render(SceneSettings(width=320, height=240, targets=3, dot_radius=8)).image
     >>> for name, pixels in {'good': image, 'bad': image[:0]}.items():
     ...     for said in stream.add(lambda: Frame(name, pixels, 'mono8', 0)):

@@ -285,6 +285,9 @@ class Identification:
         IDs that were read but are not among `expected_ids`, in ascending order.
     repeated : tuple of UndecodedTarget
         Targets whose likely ID others have, too, so that none of them is reported with it.
+    looked_for : str
+        The families that were looked for in this image, separated by commas, or 'auto' for all;
+        empty for a detector without families.
 
     Examples
     --------
@@ -307,6 +310,7 @@ class Identification:
     edge_shift: float | None = None
     other_ids: tuple[int, ...] = ()
     repeated: tuple[UndecodedTarget, ...] = ()
+    looked_for: str = ''
 
     def __len__(self) -> int:
         """Return the number of targets, undecoded ones included."""

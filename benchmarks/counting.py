@@ -15,6 +15,7 @@ from statistics import mean, median
 
 import numpy as np
 
+from ahf_ros.detectors.contract import DetectorSettings
 from ahf_ros.detectors.ring.counting import estimate_count
 from ahf_ros.detectors.ring.detector import RingDetector
 from ahf_ros.synthetic.patterns import benchmark_lights
@@ -54,10 +55,11 @@ def counted(seeds: Sequence[int]) -> list[str]:
 
 def measured(image: np.ndarray) -> tuple[int, float]:
     """Return the estimate, and its time in those of an identification by `ring`."""
+    settings = DetectorSettings(family='metashape12')
     started = time.perf_counter()
-    RingDetector()(image)
+    RingDetector(settings)(image)
     identified = time.perf_counter()
-    estimate = estimate_count(image)
+    estimate = estimate_count(image, settings)
     return estimate, (time.perf_counter() - identified) / (identified - started)
 
 

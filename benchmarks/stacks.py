@@ -68,7 +68,7 @@ def measure(options: argparse.Namespace) -> Iterator[dict[str, Any]]:
 
 def identified(images: list[np.ndarray], expected: int) -> tuple[list[Identification], float]:
     """Return what was identified in each part of a stack, and the time that it took, s."""
-    identifier = create_identifier(expected_targets=expected, ahf=False)
+    identifier = create_identifier(family='metashape12', expected_targets=expected, ahf=False)
     started = time.perf_counter()
     parts = identify_parts(identifier, images, StackSettings(stack=len(images)))
     found = [identification for _, _, identification in parts]

@@ -142,7 +142,7 @@ def search() -> Figure:
 def dots() -> Figure:
     """Return the dots that whole outlines give, and those that votes give."""
     image = render(SCENE).image
-    minimum, maximum = DetectorSettings().radii
+    minimum, maximum = DetectorSettings(family=SCENE.family).radii
     pyramid = image_pyramid(image, maximum)
     whole = whole_dots(pyramid, minimum, maximum, (1,))
     known = circle_outlines(whole.frames, np.full(len(whole.frames), 1.4))
@@ -219,7 +219,7 @@ def light() -> Figure:
 
 def _certain(image: np.ndarray, x: float) -> Hypotheses:
     """Return what the target was read as that is nearest to a column of the image."""
-    found = find_hypotheses(image, DetectorSettings())
+    found = find_hypotheses(image, DetectorSettings(family=SCENE.family))
     found = found.select(found.certain)
     return found.select(np.argmin(np.abs(found.frames[:, 0, 2] - x), keepdims=True))
 

@@ -19,7 +19,7 @@ rendered = lru_cache(render)
 
 
 def identified(image: np.ndarray, detector: str = 'ring', **settings: Any) -> list[Target]:
-    return create_detector(detector, **settings)(image)
+    return create_detector(detector, **{'family': 'metashape12', **settings})(image)
 
 
 def scored(scene: Rendering, detector: str = 'ring') -> Score:

@@ -73,7 +73,7 @@ def shown(**changes: object) -> np.ndarray:
 def test_a_second_look_says_why_nothing_was_identified(
     scene: dict, looked_for: dict, lines: list[str]
 ) -> None:
-    given = advice(shown(**scene), DetectorSettings(**looked_for))
+    given = advice(shown(**scene), DetectorSettings(**{'family': 'metashape12', **looked_for}))
     assert len(given) == len(lines)
     for line, expected in zip(given, lines, strict=True):
         assert re.match(expected, line)
@@ -83,9 +83,9 @@ def test_a_family_that_nobody_knows_is_to_be_learnt(tmp_path) -> None:
     file = tmp_path / 'mine.yaml'
     file.write_text('family: mine\nbits: 9\nband: [1.6, 2.4]\nwords: all\n')
     image = shown(family='mine', family_file=str(file))
-    (line,) = advice(image, DetectorSettings())
+    (line,) = advice(image, DetectorSettings(family='metashape12'))
     assert line.startswith('12 dots with a band of 9 sectors that no known family has: `ahf le')
-    (line,) = advice(image, DetectorSettings(family_file=str(file)))
+    (line,) = advice(image, DetectorSettings(family='metashape12', family_file=str(file)))
     assert line == '12 dots with a band of 9 sectors: --family mine'
     assert ring_family(str(file)).bits == 9
 
@@ -102,13 +102,13 @@ def test_nothing_is_said_of_what_shows_nothing() -> None:
     noise = np.random.default_rng(0).integers(0, 256, (150, 200)).astype(np.uint8)
     soft = cv2.normalize(cv2.GaussianBlur(noise, (0, 0), 3), None, 0, 255, cv2.NORM_MINMAX)
     for image in (noise, soft, np.tile(np.arange(80, dtype=np.uint8), (60, 1))):
-        assert advice(image, DetectorSettings()) == []
+        assert advice(image, DetectorSettings(family='metashape12')) == []
     with pytest.raises(ValueError, match='image is constant'):
-        advice(np.zeros((60, 80), np.uint8), DetectorSettings())
+        advice(np.zeros((60, 80), np.uint8), DetectorSettings(family='metashape12'))
 
 
 def test_a_filter_is_advised_where_it_may_show_more() -> None:
-    image, settings = shown(dot_radius=12), DetectorSettings()
+    image, settings = shown(dot_radius=12), DetectorSettings(family='metashape12')
     (line,) = advice(image, settings)  # as if no band had been read
     assert line.startswith('12 dots with a band of 12 sectors are hard to read: give --expected-')
     assert advice(image, settings, expected_targets=12) == []
@@ -160,7 +160,7 @@ def test_a_second_look_is_at_the_part_with_the_most_dots() -> None:
     image = np.full((3000, 4000), 220, np.uint8)
     targets = shown(family='cct10')
     image[2300:2900, 3100:3900] = targets
-    (line,) = advice(image, DetectorSettings())
+    (line,) = advice(image, DetectorSettings(family='metashape12'))
     assert re.match(r'1[12] dots with a band of 10 sectors: --family cct10', line)
 
 
@@ -171,7 +171,7 @@ def finish(adviser: Adviser) -> None:
 
 def test_a_stream_gets_advice_once_and_only_while_nothing_is_identified() -> None:
     image = shown(family='cct10')
-    adviser = Adviser(DetectorSettings())
+    adviser = Adviser(DetectorSettings(family='metashape12'))
     for identified in (0,) * (IN_A_ROW - 1) + (1,) + (0,) * (IN_A_ROW - 1):
         adviser.see(image, identified)
     finish(adviser)

@@ -7,12 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ahf_ros.detectors import DetectorSettings
+from ahf_ros.detectors import DetectorSettings, create_detector
 from ahf_ros.filtering.settings import AdaptiveSettings
+from ahf_ros.nodes.settings import DetectorNodeSettings
 from ahf_ros.session import create_identifier, identify
 from ahf_ros.session_settings import IdentificationSettings
 from ahf_ros.settings.nested import flat_parameters, flat_values, updated
+from ahf_ros.synthetic.scene import SceneSettings
 from ahf_ros.target import Target
+from support.scenes import rendered
 
 IMAGE = np.arange(400, dtype=np.uint8).reshape(20, 20)
 
@@ -119,3 +122,32 @@ def test_only_targets_of_the_detector_are_counted() -> None:
     with pytest.raises(ValueError, match=message):
         create_identifier(detector=Filtered(), family='aicon12', estimate_expected=True)
     assert create_identifier(detector=Filtered(), estimate_expected=True)
+
+
+@pytest.mark.parametrize(
+    'values',
+    [
+        {'family': 'metashape12'},
+        {'family': 'apriltag_36h11'},
+        {'family': 'gsi', 'dot_radius': 5},
+    ],
+)
+def test_all_families_are_looked_for_by_default_and_the_result_says_so(values: dict) -> None:
+    scene = SceneSettings(
+        **{'width': 640, 'height': 480, 'targets': 4, 'dot_radius': 12, **values}
+    )
+    shown = rendered(scene)
+    found = identify(shown.image)
+    assert found.looked_for == 'auto'
+    assert [it.key for it in found] == [it.key for it in shown.targets]
+    named = identify(shown.image, family=scene.family)
+    assert (named.looked_for, len(named)) == (scene.family, 4)
+    other = identify(shown.image, family='cctag3,dots')
+    assert (other.looked_for, len(other)) == ('cctag3,dots', 0)
+    own = identify(shown.image, detector=lambda image: [target(1)])
+    assert own.looked_for == ''
+
+
+def test_every_way_in_has_the_same_default() -> None:
+    assert DetectorSettings().family == DetectorNodeSettings().identification.detection.family
+    assert create_detector().family == create_identifier().identify(IMAGE).looked_for == 'auto'

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from ahf_ros.detectors import create_detector
-from ahf_ros.detectors.contract import Unavailable
+from ahf_ros.detectors.contract import DetectorSettings, Unavailable
 from ahf_ros.session import create_identifier
 from ahf_ros.session_settings import IdentificationSettings
 from ahf_ros.stream import (
@@ -86,7 +86,7 @@ def test_a_stack_identifies_what_no_image_does():
     images = [render(SCENE, phase).image for phase in range(4)]
     truth = {target.id for target in render(SCENE).targets}
     settings = StackSettings(stack=4)
-    identifier = create_identifier(expected_targets=4)
+    identifier = create_identifier(family='metashape12', expected_targets=4)
     ((part, stack, found),) = identify_parts(identifier, images, settings)
     assert (part.images, part.split, stack.shape) == (range(4), '', (360, 480))
     assert {target.id for target in found.targets} == truth
@@ -101,7 +101,7 @@ def test_a_stack_is_split_where_the_scene_moved():
     assert second.split.startswith('the scene moved by 4.0')
     assert second.split.endswith('before image 3 of the stack')
     assert [part.images for part in unmoved_parts(images, look_for_movement=False)] == [range(4)]
-    identifier = create_identifier(expected_targets=4)
+    identifier = create_identifier(family='metashape12', expected_targets=4)
     parts = list(identify_parts(identifier, images, StackSettings(stack=4)))
     places = [found.targets[0].x for _, _, found in parts]
     assert abs(places[1] - places[0] - 4) < 0.02
@@ -191,12 +191,15 @@ def test_a_detector_that_cannot_be_used_refuses_no_image():
 
 
 def test_a_stream_that_is_resumed_goes_on_as_if_it_had_not_ended():
-    settings = IdentificationSettings(expected_targets=4)
+    settings = IdentificationSettings(
+        expected_targets=4, detection=DetectorSettings(family='metashape12')
+    )
     stacking = StackSettings(stack=3, stack_window=SLIDING)
     frames = [Frame(str(it), render(SCENE, it).image, 'mono8', it) for it in range(4)]
 
     def made() -> Stream[str]:
-        return Stream(settings, stacking, create_detector('ring'), timed=False)
+        detector = create_detector(settings=settings.detection)
+        return Stream(settings, stacking, detector, timed=False)
 
     whole, broken = made(), made()
     answers: list[Answer[str]] = []

@@ -76,7 +76,9 @@ def show(scene: SceneSettings, picture: Path) -> None:
     title = f'{scene.light}, ambient light {scene.ambient:g}'
     tiles = [Tile(image, title, [(f'{len(truth)} targets', TEXT_COLOUR)])]
     for way, options in WAYS.items():
-        found = create_identifier(expected_targets=len(truth), **options).identify(image)
+        found = create_identifier(
+            family=scene.family, expected_targets=len(truth), **options
+        ).identify(image)
         print(f'  {way:{max(map(len, WAYS))}}  {line(found, truth)}', flush=True)
         seen = filtered(image, found.filter)
         tiles.append(tile(f'{way}: {method(found)}', seen, found, truth))

@@ -11,9 +11,10 @@ from typing import Any, TypeVar
 
 from ahf_ros.cloud_settings import CloudSettings
 from ahf_ros.codes.families import files_by_name
+from ahf_ros.detectors.contract import DetectorSettings
 from ahf_ros.filtering.settings import AdaptiveSettings
 from ahf_ros.registration_settings import RegistrationSettings
-from ahf_ros.session_settings import AnyTargetSettings, IdentificationSettings
+from ahf_ros.session_settings import IdentificationSettings
 from ahf_ros.settings.nested import assemble, flat_parameters
 from ahf_ros.settings.parameter import Parameter, parameters
 
@@ -33,7 +34,7 @@ def add_target_options(parser: argparse.ArgumentParser) -> None:
     group = parser.add_argument_group('targets')
     for item in parameters(IdentificationSettings):
         add_option(group, item)
-    add_options(group, AnyTargetSettings)
+    add_options(group, DetectorSettings)
 
 
 def add_search_options(parser: argparse.ArgumentParser) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
 from ahf_ros.codes.families import (
@@ -207,7 +207,7 @@ class DetectorSettings:
     """
 
     family: str = parameter(
-        'metashape12',
+        AUTO,
         'Family of the coded targets, or several. It also chooses the detector where that is '
         'auto.',
         form=ACCEPTED,
@@ -298,7 +298,7 @@ class FamilyDetector(ABC):
     It raises a ValueError if the family, or the data file that describes it, is not accepted.
     """
 
-    settings: DetectorSettings = field(default_factory=DetectorSettings)
+    settings: DetectorSettings
 
     def __post_init__(self) -> None:
         """Refuse what is not accepted before the first image comes."""

@@ -131,6 +131,8 @@ class Identifier:
         From a target to the ID that it has in a mirror, None if that is unknown.
     name : str
         What errors call the detector.
+    looked_for : str
+        The families that the detector looks for, as the results name them.
     clock : callable, optional
         Time in s.
 
@@ -145,7 +147,8 @@ class Identifier:
     --------
     >>> from ahf_ros import Identifier, SceneSettings, create_detector, render
     >>> scene = render(SceneSettings(width=320, height=240, targets=3, dot_radius=8))
-    >>> Identifier(create_detector('ring')).identify(scene.image, expected_targets=3).count
+    >>> detector = create_detector(family='metashape12')
+    >>> Identifier(detector).identify(scene.image, expected_targets=3).count
     3
     """
 
@@ -163,6 +166,7 @@ class Identifier:
         contested: bool = False,
         mirrored: MirroredId | None = None,
         name: str = 'detector',
+        looked_for: str = '',
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self.last_search: SearchResult | None = None
@@ -184,6 +188,7 @@ class Identifier:
         self._contested = contested
         self._mirrored = mirrored
         self._name = name
+        self._looked_for = looked_for
 
     def reset(self) -> None:
         """Forget what worked for earlier images."""
@@ -296,6 +301,7 @@ class Identifier:
             edge_shift=median_edge_shift(ordered),
             other_ids=trials.left_out(choice.filter),
             repeated=repeated,
+            looked_for=self._looked_for,
         )
 
     def _trials(self, stack: ImageStack) -> Trials:

@@ -139,6 +139,7 @@ class SettlingIdentifier(Identifier):
                 families = self._ordered(_families(found.targets))
             elif not found or families != known:
                 found = self._read(stack, families, expected_targets)
+            found = replace(found, looked_for=self._looked_for)
             shown = min(self.memory.shown + (found.count > 0), FIRST)
             self.memory = replace(self.memory, families=families, shown=shown)
         self._looked = None

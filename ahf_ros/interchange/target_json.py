@@ -75,6 +75,7 @@ def to_json(
         'height': height,
         'upright': upright,
         'family': family,
+        'looked_for': identification.looked_for,
         'detector': detector,
         'expected': identification.expected,
         'estimated': identification.estimated,

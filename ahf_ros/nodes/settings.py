@@ -12,7 +12,7 @@ from ahf_ros.codes.families import families_of
 from ahf_ros.detectors import DETECTOR, detector_name
 from ahf_ros.registration_settings import RegistrationSettings, check_frame, unit_parameter
 from ahf_ros.session import create_identifier
-from ahf_ros.session_settings import AnyTargetSettings, IdentificationSettings, StackSettings
+from ahf_ros.session_settings import IdentificationSettings, StackSettings
 from ahf_ros.settings.parameter import check_parameters, parameter
 from ahf_ros.synthetic.scene import SceneSettings
 from ahf_ros.text import printable
@@ -69,7 +69,6 @@ class NodeIdentificationSettings(IdentificationSettings):
         choices=(*DETECTOR.choices, SERVICE),
         read_only=True,
     )
-    detection: AnyTargetSettings = field(default_factory=AnyTargetSettings)
 
     def check_detector(self) -> None:
         """Refuse a detector that does not identify the family; a service identifies any."""

@@ -20,7 +20,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """Write targets.csv and a picture of each result."""
     parser = argparse.ArgumentParser(description='Identify the targets in photographs.')
     parser.add_argument('photographs', type=Path, help='a folder')
-    parser.add_argument('--family', default='metashape12')
+    parser.add_argument('--family', default='auto')
     parser.add_argument(
         '--expected-targets', type=int, default=0, help='targets in each; 0: unknown'
     )

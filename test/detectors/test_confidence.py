@@ -48,7 +48,7 @@ def test_a_target_shows_what_is_typical_of_its_size_and_light(light: str, radius
     shown = rendering(
         width=700, height=500, targets=6, dot_radius=radius, light=light, ambient=0.3, seed=5
     )
-    found = find_hypotheses(shown.image, DetectorSettings())
+    found = find_hypotheses(shown.image, DetectorSettings(family='metashape12'))
     found = found.select(found.certain)
     assert len(found.words) >= 6  # a dot may be read twice
     assert 0.7 < np.median(found.seen / found.typical) < 1.4
@@ -58,7 +58,9 @@ def test_a_halo_of_sharpening_is_no_arc_of_any_length() -> None:
     shown = rendering(width=1200, height=900, targets=4, dot_radius=34.0, seed=5)
     gray = shown.image.astype(np.float32)
     halo = 2.5 * gray - 1.5 * cv2.GaussianBlur(gray, (0, 0), 1.5)
-    found = find_hypotheses(np.clip(halo, 0, 255).astype(np.uint8), DetectorSettings())
+    found = find_hypotheses(
+        np.clip(halo, 0, 255).astype(np.uint8), DetectorSettings(family='metashape12')
+    )
     found = found.select(found.certain)
     assert len(found.words) == 4
     assert (found.coded > -DOUBT).all()

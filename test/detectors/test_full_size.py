@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from ahf_ros.codes import VENDOR_NAMES
+from ahf_ros.detectors import DetectorSettings
 from ahf_ros.detectors.ring.counting import estimate_count
 from ahf_ros.evaluation import score
 from ahf_ros.synthetic.scene import SceneSettings, render
@@ -49,7 +50,7 @@ def test_large_dots_in_projected_light_that_are_seen_from_the_side(light, polari
         [150.0, 65.0, 20.0], light=light, ambient=0.12, tilt=40.0, polarity=polarity, seed=3
     )
     check(shown, 'metashape12')
-    assert estimate_count(shown.image) == len(shown.truth)
+    assert estimate_count(shown.image, DetectorSettings(family='metashape12')) == len(shown.truth)
 
 
 def test_limits_are_obeyed_at_every_size():

@@ -109,7 +109,7 @@ def covered():
     """Return photographs of targets under paper, their truth, and what is read without IDs."""
     sheets = [target_sheet(CODE.name, IDS, seed) for seed in (31, 32, 33)]
     shown = [(sheet.photograph(PAPER_ON_PAPER), sheet.truth) for sheet in sheets]
-    blind = create_detector('ring')
+    blind = create_detector('ring', family='metashape12')
     return [(image, truth, kinds(blind(image), truth)) for image, truth in shown]
 
 
@@ -128,21 +128,23 @@ def test_no_two_ids_chosen_far_apart_look_alike_where_sectors_are_covered():
 @pytest.mark.lasting
 def test_paper_on_paper_turns_one_id_into_another_unless_they_are_known(covered):
     assert any(WRONG in blind for _, _, blind in covered)  # no trace is left to see
-    informed = create_detector('ring').expecting(frozenset(IDS))
+    informed = create_detector('ring', family='metashape12').expecting(frozenset(IDS))
     read = [kind for image, truth, _ in covered for kind in kinds(informed(image), truth)]
     assert set(read) == {RIGHT}
 
 
 def test_expected_ids_reach_the_detector(covered):
     image, truth = next((image, truth) for image, truth, blind in covered if WRONG in blind)
-    identifier = create_identifier(expected_ids=','.join(map(str, IDS)), ahf=False)
+    identifier = create_identifier(
+        family='metashape12', expected_ids=','.join(map(str, IDS)), ahf=False
+    )
     assert WRONG not in kinds(identifier.identify(image).targets, truth)
 
 
 def test_ids_that_are_not_expected_are_never_read_as_expected_ones():
     sheet = target_sheet(CODE.name, IDS, 31)
     others = frozenset(range(1, len(CODE.words) + 1)) - frozenset(IDS)
-    detector = create_detector('ring')
+    detector = create_detector('ring', family='metashape12')
     assert isinstance(detector, Expecting)
     read = kinds(detector.expecting(others)(sheet.photograph(Exposure())), sheet.truth)
     assert read.count(RIGHT) == len(read) > 0

@@ -117,12 +117,12 @@ def test_a_filter_leaves_no_trace_in_the_places(name):
     """The detector is blind to the image as received; AHF refines there all the same."""
     image = rendered(SCENE).image
 
-    class Filtered(type(create_detector(name))):
+    class Filtered(type(create_detector(name, family='metashape12'))):
         def __call__(self, shown):
             return [] if shown is image else super().__call__(shown)
 
     settings = AdaptiveSettings(threads=1, genetic=GeneticSettings(max_evaluations=6))
-    detector = Filtered(DetectorSettings())
+    detector = Filtered(DetectorSettings(family='metashape12'))
     result = Identifier(detector, settings, refine=detector.refine).identify(
         image, expected_targets=6
     )
@@ -138,7 +138,7 @@ def test_bright_dots_on_black_keep_their_size() -> None:
     scene = replace(SCENE, targets=12, dot_radius=8.0, polarity='bright', light='normal')
     dark = np.rint((rendered(scene).image / 255) ** 3 * 120)
     image = np.where(dark < 6, 0, dark).astype(np.uint8)
-    detector = create_detector('ring')
+    detector = create_detector('ring', family='metashape12')
     targets = detector(image)
     assert len(targets) == 12
     for target, refined in zip(targets, detector.refine(image, targets), strict=True):

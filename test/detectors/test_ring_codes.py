@@ -18,7 +18,7 @@ SCENES = [('ring', 'normal'), ('ring', 'stripe'), ('traditional', 'normal')]
 
 @pytest.fixture(params=['ring', 'traditional'])
 def detector(request):
-    return create_detector(request.param)
+    return create_detector(request.param, family='metashape12')
 
 
 @pytest.mark.parametrize('polarity', ['dark', 'bright'])
@@ -42,7 +42,7 @@ def test_all_targets_of_every_family(name, maximum_error, family, polarity):
 @pytest.mark.parametrize(('name', 'light'), SCENES)
 def test_other_types_of_pixels_show_the_same(converted, name, light):
     image = rendered(replace(SMALL, light=light)).image
-    detector = create_detector(name)
+    detector = create_detector(name, family='metashape12')
     expected, found = detector(image), detector(converted(image))
     assert expected and [target.id for target in found] == [target.id for target in expected]
     for target, other in zip(found, expected, strict=True):
@@ -64,7 +64,7 @@ def test_noise_shows_no_targets(detector):
 @pytest.mark.parametrize(('name', 'light'), SCENES)
 def test_the_result_does_not_depend_on_threads(name, light):
     image = rendered(replace(SMALL, light=light)).image
-    detector = create_detector(name)
+    detector = create_detector(name, family='metashape12')
     expected = detector(image)
     threads = cv2.getNumThreads()
     try:

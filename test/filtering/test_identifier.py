@@ -584,10 +584,14 @@ def test_what_cannot_tell_does_not():
 def test_a_mirrored_image_of_expected_targets_is_said_to_be_one():
     rendering = render(SceneSettings(width=640, height=480, targets=8, dot_radius=10, seed=3))
     ids = ','.join(str(target.id) for target in rendering.targets)
-    identifier = create_identifier(expected_ids=ids, ahf=False)
+    identifier = create_identifier(family='metashape12', expected_ids=ids, ahf=False)
     assert not identifier.identify(rendering.image).mirrored
     found = identifier.identify(rendering.image[:, ::-1].copy())
     assert found.mirrored
     assert found.count < 4 and found.expected == 8
-    assert not create_identifier().identify(rendering.image[:, ::-1].copy()).mirrored
+    assert (
+        not create_identifier(family='metashape12')
+        .identify(rendering.image[:, ::-1].copy())
+        .mirrored
+    )
     assert not identifier.identify(rendering.image[::-1, ::-1].copy()).mirrored  # upside down

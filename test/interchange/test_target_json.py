@@ -44,7 +44,7 @@ def test_what_becomes_json_is_read_again():
 def test_codes_say_how_they_are_read_and_are_read_without_that() -> None:
     """As printed: what is inked of `bits`, clockwise, is the code of the rendering."""
     scene = rendered(SceneSettings(width=640, height=480, targets=4, dot_radius=12, seed=3))
-    found = identify(scene.image)
+    found = identify(scene.image, family='metashape12')
     record = to_json(found, 'a.png', (480, 640), 'metashape12', 'ring')
     reading = {'bits': 12, 'first_bit': 'lowest', 'direction': 'counter-clockwise'}
     assert record['codes'] == {'metashape12': reading}

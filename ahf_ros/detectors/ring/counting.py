@@ -24,15 +24,15 @@ from ahf_ros.imaging.image import as_gray, check_image
 _OF_WORDS = 0.5  # of what speaks against a word, which counts against a target
 
 
-def estimate_count(image: np.ndarray, settings: DetectorSettings | None = None) -> int:
+def estimate_count(image: np.ndarray, settings: DetectorSettings) -> int:
     """Estimate how many coded targets an image shows.
 
     Parameters
     ----------
     image : ndarray of uint8, uint16, float32 or float64, shape (height, width)
         As received.
-    settings : DetectorSettings, optional
-        Proportions, colour and sizes of the targets; the defaults where None.
+    settings : DetectorSettings
+        Families of rings, colour and sizes of the targets.
 
     Returns
     -------
@@ -44,7 +44,6 @@ def estimate_count(image: np.ndarray, settings: DetectorSettings | None = None) 
     ValueError
         If the image is not accepted.
     """
-    settings = settings or DetectorSettings()
     check_image(image)
     read = find_hypotheses(as_gray(image), settings)
     major, _, _ = frame.ellipse_axes(read.frames)

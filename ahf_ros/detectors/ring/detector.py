@@ -8,7 +8,7 @@ together to a projective frame, whose origin is the image of the target's physic
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 
@@ -62,7 +62,7 @@ class RingDetector:
         Whether targets whose ID others have, too, are among the results, undecoded.
     """
 
-    settings: DetectorSettings = field(default_factory=DetectorSettings)
+    settings: DetectorSettings
     expected: frozenset[int] = frozenset()
     contested: bool = False
 

@@ -151,6 +151,7 @@ DotsOfOctave = tuple[Octave, list[Dots]]
 def dots_in(image: np.ndarray, settings: DetectorSettings) -> list[DotsOfOctave]:
     """Return the dots of an image that may have bands, whole ones first."""
     check_image(image)
+    settings = settings.narrowed(RING_NAMES)
     pyramid = image_pyramid(as_gray(image), settings.max_radius)
     return [
         (
