@@ -128,8 +128,10 @@ class UndecodedTarget(Target):
     Attributes
     ----------
     reason : str
-        'unread' if no code word is likely, 'uncertain' if one is but not certain, and 'contested'
-        if another target contradicts it: by its ID, by its place, or by lying on top of it.
+        'unread' if no code word is likely, 'uncertain' if one is but not certain, 'contested' if
+        another target contradicts it: by its ID, by its place, or by lying on top of it, and
+        'unsettled' if all families were looked for and the image does not show this one for
+        certain.
     likely_id : int
         ID of the most likely code word, whose probability is `confidence`; `UNDECODED` if no code
         word is likely.
@@ -150,6 +152,11 @@ class UndecodedTarget(Target):
     def is_contested(self) -> bool:
         """Whether its code word is certain, and only another target contradicts it."""
         return self.reason == 'contested'
+
+    @property
+    def is_unsettled(self) -> bool:
+        """Whether its code word is certain, and only its family is not."""
+        return self.reason == 'unsettled'
 
 
 @dataclass(frozen=True, slots=True)
@@ -285,6 +292,9 @@ class Identification:
         IDs that were read but are not among `expected_ids`, in ascending order.
     repeated : tuple of UndecodedTarget
         Targets whose likely ID others have, too, so that none of them is reported with it.
+    unsettled : tuple of UndecodedTarget
+        Targets that would be reported if their family was named: all were looked for, and this
+        image alone does not show theirs for certain.
     looked_for : str
         The families that were looked for in this image, separated by commas, or 'auto' for all;
         empty for a detector without families.
@@ -310,6 +320,7 @@ class Identification:
     edge_shift: float | None = None
     other_ids: tuple[int, ...] = ()
     repeated: tuple[UndecodedTarget, ...] = ()
+    unsettled: tuple[UndecodedTarget, ...] = ()
     looked_for: str = ''
 
     def __len__(self) -> int:

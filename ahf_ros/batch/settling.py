@@ -2,27 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from itertools import chain
 
 from ahf_ros.batch.engine import Engine, finished_tasks, in_order
 from ahf_ros.batch.results import outcome_of
 from ahf_ros.batch.task import ImageOutcome, ImageTask
 from ahf_ros.codes.families import AUTO
-from ahf_ros.filtering.settling import FIRST
+from ahf_ros.filtering.settling import FIRST, Reading, evident_together
 from ahf_ros.session_settings import IdentificationSettings
 from ahf_ros.settings.nested import updated
 from ahf_ros.target import UNDECODED
 
 _LOOK = {'ahf': False, 'expected_targets': 0, 'estimate_expected': False}
+_MOST = 12  # images that are looked at before any is identified
 
 
 def settled_tasks(engine: Engine, tasks: Sequence[ImageTask]) -> Sequence[ImageTask]:
     """Return tasks with the families that the first of them show, where all are looked for.
 
-    The result does not depend on the engine. A single task settles its families itself, and so do
-    all tasks if the first ones show no target. Where looking has identified what the families of
+    They are looked at a few at a time, until they show a family, each alone or all together. The
+    result does not depend on the engine. A single task settles its families itself, and so do all
+    tasks if the first ones show no target. Where looking has identified what the families of
     all show, the task carries its outcome.
     """
     if len(tasks) < 2:
@@ -30,14 +31,22 @@ def settled_tasks(engine: Engine, tasks: Sequence[ImageTask]) -> Sequence[ImageT
     settings = tasks[0].settings
     if not AUTO == settings.detection.family == settings.detector:
         return tasks
-    first = [replace(task, overlays=(), settings=_looking(task)) for task in tasks[:FIRST]]
-    outcomes = [outcome_of(it.task, it.result) for it in in_order(finished_tasks(engine, first))]
-    shown = [_shown(outcome) for outcome in outcomes]
-    together = frozenset().union(*chain(*shown))
+    looks: list[ImageTask] = []
+    outcomes: list[ImageOutcome] = []
+    together: frozenset[str] = frozenset()
+    while not together and len(looks) < min(_MOST, len(tasks)):
+        following = tasks[len(looks) : len(looks) + FIRST]
+        some = [replace(task, overlays=(), settings=_looking(task)) for task in following]
+        outcomes += [
+            outcome_of(it.task, it.result) for it in in_order(finished_tasks(engine, some))
+        ]
+        looks += some
+        joint = evident_together([list(_readings(it)) for it in outcomes])
+        together = frozenset(joint).union(*(it for of in outcomes for it in _shown(of)))
     families = tuple(name for name in settings.detection.families if name in together)
     settled = [replace(task, families=families) for task in tasks]
-    for number, (look, outcome) in enumerate(zip(first, outcomes, strict=True)):
-        if look == tasks[number] and {together} == set(shown[number]):
+    for number, (look, outcome) in enumerate(zip(looks, outcomes, strict=True)):
+        if look == tasks[number] and {together} == set(_shown(outcome)):
             settled[number] = replace(settled[number], outcome=outcome)
     return settled
 
@@ -50,7 +59,17 @@ def _looking(task: ImageTask) -> IdentificationSettings:
 
 
 def _shown(outcome: ImageOutcome) -> list[frozenset[str]]:
+    """Return the families of what is reported, of each record."""
     return [
         frozenset(it['family'] for it in record['targets'] if it['id'] != UNDECODED)
         for record in outcome.records
     ]
+
+
+def _readings(outcome: ImageOutcome) -> Iterator[Reading]:
+    """Yield what was read in images, also where they alone are no evidence for its family."""
+    for record in outcome.records:
+        for it in record['targets']:
+            yield it['family'], it['id'], it['confidence']
+        for it in record['unsettled']:
+            yield it['likely_family'], it['likely_id'], it['confidence']

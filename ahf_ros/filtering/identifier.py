@@ -126,7 +126,8 @@ class Identifier:
         Patience of a search where the settings have 0, which then shows what its best filter does:
         fusion lives on many. 0 for no limit.
     contested : bool
-        Whether the results have targets that another one contradicts, with the ID `UNDECODED`.
+        Whether the results have targets that another one contradicts, or whose family is not
+        settled, with the ID `UNDECODED`.
     mirrored : callable, optional
         From a target to the ID that it has in a mirror, None if that is unknown.
     name : str
@@ -270,9 +271,7 @@ class Identifier:
             targets = fused([trials.targets[values] for values in agreeing])
         repeated = repeated_targets(targets)
         if not self._contested:
-            targets = [
-                it for it in targets if not (isinstance(it, UndecodedTarget) and it.is_contested)
-            ]
+            targets = [it for it in targets if not _is_certain_alone(it)]
         self.last_search = choice.search
         settled = (trials.count(choice.filter), choice.expected) if estimating else None
         self.memory = replace(self.memory, filter=choice.remembered, settled=settled)
@@ -376,6 +375,11 @@ class Identifier:
         remembered = self.memory.filter
         genes = genes_of(self._settings.tuning)
         return remembered if trials.suits(remembered, len(genes)) else None
+
+
+def _is_certain_alone(target: Target) -> bool:
+    """Return whether a target has no ID only because of what else is known of its image."""
+    return isinstance(target, UndecodedTarget) and (target.is_contested or target.is_unsettled)
 
 
 def is_mirrored(

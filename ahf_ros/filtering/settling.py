@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from dataclasses import fields, replace
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -20,16 +21,20 @@ from ahf_ros.filtering.identifier import Identifier, Memory
 from ahf_ros.filtering.trials import DetectorFunction, Trials
 from ahf_ros.imaging.stack import ImageStack
 from ahf_ros.notices import said_once
-from ahf_ros.target import UNDECODED, Identification, Target
+from ahf_ros.target import UNDECODED, Identification, Target, UndecodedTarget
 
 FIRST = 3
 """Images with targets in which all families are looked for."""
 
 _OF_ONE = 2.0  # decimal logarithm of the odds on a family: one target certain to 0.99
-_OF_SEVERAL = 3.9  # ... of all together: three certain to 0.95, or two to 0.989
+_OF_SEVERAL = 3.6  # ... of all together: three certain to 0.94, or two to 0.984
+_PER_IMAGE = 0.3  # words that texture shows by chance in an image, at the most
 _OF_KNOWN = 1.99  # ... on families that other images have settled: one certain to 0.99
 _DOUBTFUL = 0.9  # confidence up to which words are read in nearly any texture
 _CERTAIN = 1e-3  # probability that a target is wrong, below which it counts for no more
+
+Reading = tuple[str, int, float]
+"""Family, ID and confidence of a target."""
 
 
 def memory_of(families: Sequence[str]) -> Memory:
@@ -42,15 +47,50 @@ def evident(targets: Sequence[Target]) -> list[Target]:
 
     Where all families are looked for, words of some are read in nearly any texture. Most are
     doubtful, which is no evidence, and the others are few of one family: one that is certain is
-    evidence, or three to 0.95. What is read in several places, as letters may
+    evidence, or three to 0.94. What is read in several places, as letters may
     be, counts once.
     """
     shown = {
         family
-        for family, of in _evidence(targets).items()
+        for family, of in _evidence(map(_reading, targets)).items()
         if max(of) > _OF_ONE or sum(of) > _OF_SEVERAL
     }
     return [it for it in targets if it.id == UNDECODED or it.family in shown]
+
+
+def marked(targets: Sequence[Target]) -> list[Target]:
+    """Return targets, those of families that they are no evidence for undecoded."""
+    settled = evident(targets)
+    return [it if it in settled else _unsettled(it) for it in targets]
+
+
+def _unsettled(target: Target) -> UndecodedTarget:
+    known: dict[str, Any] = {of.name: getattr(target, of.name) for of in fields(Target)}
+    known |= {'id': UNDECODED, 'code': 0, 'family': ''}
+    return UndecodedTarget(
+        **known, reason='unsettled', likely_id=target.id, likely_family=target.family
+    )
+
+
+def evident_together(images: Sequence[Iterable[Reading]]) -> set[str]:
+    """Return the families that images show together, though perhaps none of them alone.
+
+    Of each image, all that was read in it counts, whether it was reported or not. Texture shows a
+    word now and then: the more images there are, the more of them it takes, or the surer ones. An
+    ID counts once, as the same texture may be in several images.
+
+    Examples
+    --------
+    >>> single = [[('metashape12', number, 0.98)] for number in (15, 17, 22)]
+    >>> evident_together(single), evident_together(single[:1])
+    ({'metashape12'}, set())
+    """
+    by_chance = max(math.log10(_PER_IMAGE * len(images)), 0.0) if images else 0.0
+    return {
+        family
+        for family, of in _evidence(chain.from_iterable(images)).items()
+        if sum(max(odds - by_chance, 0.0) for odds in of) > _OF_SEVERAL
+    }
 
 
 def still_shown(targets: Sequence[Target]) -> bool:
@@ -58,14 +98,19 @@ def still_shown(targets: Sequence[Target]) -> bool:
 
     A doubtful word may be read in a target of another family.
     """
-    return any(sum(of) > _OF_KNOWN for of in _evidence(targets).values())
+    return any(sum(of) > _OF_KNOWN for of in _evidence(map(_reading, targets)).values())
 
 
-def _evidence(targets: Sequence[Target]) -> dict[str, list[float]]:
-    """Return the decimal logarithms of the odds that targets are right, by family."""
+def _reading(target: Target) -> Reading:
+    return target.family, target.id, target.confidence
+
+
+def _evidence(readings: Iterable[Reading]) -> dict[str, list[float]]:
+    """Return the decimal logarithms of the odds that readings are right, by family."""
     surest: defaultdict[tuple[str, int], float] = defaultdict(float)
-    for target in targets:
-        surest[target.key] = max(surest[target.key], target.confidence)
+    for family, number, confidence in readings:
+        if number != UNDECODED:
+            surest[family, number] = max(surest[family, number], confidence)
     evidence: defaultdict[str, list[float]] = defaultdict(list)
     for (family, _), confidence in surest.items():
         if confidence > _DOUBTFUL:
@@ -75,6 +120,17 @@ def _evidence(targets: Sequence[Target]) -> dict[str, list[float]]:
 
 def _families(targets: Iterable[Target]) -> set[str]:
     return {target.family for target in targets if target.id != UNDECODED}
+
+
+def _beside(
+    seen: Iterable[Target], found: Sequence[Target], families: Collection[str]
+) -> Iterator[UndecodedTarget]:
+    """Yield what was seen of other families than those that are read, and where none is found."""
+    for it in seen:
+        if isinstance(it, UndecodedTarget) and it.is_unsettled:
+            near = any(math.hypot(it.x - of.x, it.y - of.y) < of.semi_major for of in found)
+            if it.likely_family not in families and not near:
+                yield it
 
 
 def families_line(families: Iterable[str]) -> str:
@@ -111,9 +167,9 @@ class SettlingIdentifier(Identifier):
         narrowed: Callable[[tuple[str, ...]], Identifier],
         **options: Any,
     ) -> None:
-        drafted = draft and (lambda image: evident(draft(image)))
+        drafted = draft and (lambda image: marked(draft(image)))
         super().__init__(
-            lambda image: evident(detector(image)), *arguments, draft=drafted, **options
+            lambda image: marked(detector(image)), *arguments, draft=drafted, **options
         )
         self._families = families
         self._narrowed = narrowed
@@ -133,27 +189,28 @@ class SettlingIdentifier(Identifier):
         if self.memory.shown >= FIRST:
             found = self._read(stack, known, expected_targets)
         if not (found and still_shown(found.targets)):
-            families = self._ordered({*known, *self._look(stack)})
+            seen = self._look(stack)
+            families = self._ordered({*known, *_families(seen)})
             if not families:
                 found = super().identify(stack, expected_targets=expected_targets)
                 families = self._ordered(_families(found.targets))
             elif not found or families != known:
                 found = self._read(stack, families, expected_targets)
-            found = replace(found, looked_for=self._looked_for)
+            unsettled = tuple(_beside(seen, found.targets, families))
+            found = replace(found, looked_for=self._looked_for, unsettled=unsettled)
             shown = min(self.memory.shown + (found.count > 0), FIRST)
             self.memory = replace(self.memory, families=families, shown=shown)
         self._looked = None
         state = replace(found.filter, duration=self._clock() - started)
         return replace(found, filter=state)
 
-    def _look(self, stack: ImageStack) -> set[str]:
-        """Return the families that an image shows as received, or a combination of a stack."""
+    def _look(self, stack: ImageStack) -> list[Target]:
+        """Return what an image shows as received, or the first combination that shows a target."""
         self._looked = trials = super()._trials(stack)
         for plain in trials.plain:
-            trials.count(plain)
-            if shown := _families(trials.targets[plain]):
-                return shown
-        return set()
+            if trials.count(plain):
+                return trials.targets[plain]
+        return trials.targets[trials.plain[0]]
 
     def _trials(self, stack: ImageStack) -> Trials:
         """Return what is known of an image or stack that was looked at."""

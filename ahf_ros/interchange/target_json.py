@@ -27,7 +27,12 @@ _NAMES = [it.name for it in fields(Target)]
 _ABSENT = {'id': None, 'x': None, 'y': None, 'code': 0, 'semi_major': 0.0, 'semi_minor': 0.0}
 """What the fields of a target without a default are where they are not given."""
 
-_REASONS = ('unread', 'uncertain', 'contested')  # see `ahf_ros.target.UndecodedTarget`
+_REASONS = (
+    'unread',
+    'uncertain',
+    'contested',
+    'unsettled',
+)  # see `ahf_ros.target.UndecodedTarget`
 _MAXIMUM_DOTS = 1000  # of one target
 
 
@@ -88,6 +93,7 @@ def to_json(
             for target in targets
         ],
         'repeated': [asdict(target) for target in identification.repeated],
+        'unsettled': [asdict(target) for target in identification.unsettled],
         'filter': used,
         'search': asdict(identification.search) if identification.search else None,
         'elapsed_s': elapsed,

@@ -121,7 +121,7 @@ def test_doubtful_targets_of_few_are_no_evidence_for_a_family() -> None:
 
     doubtful = [target('cct8', 1, 0.95), target('cct8', 2, 0.9), target('cct9', 2, 0.98)]
     doubtful += [target('cctag3', 5, 0.89), target('cctag3', 21, 0.99), target('cctag3', 28, 0.76)]
-    doubtful += [target('gsi', it, 0.987) for it in (1, 2)]  # two do not show a family
+    doubtful += [target('gsi', it, 0.98) for it in (1, 2)]  # two do not show a family
     doubtful += [target('aruco_original', 1023, 0.99)] * 4  # as letters are
     sure = [target('aicon12', 5, 0.9995), *(target('cct12', it, 0.95) for it in range(3))]
     undecoded = target('', -1, 0.5)
