@@ -10,9 +10,10 @@ from __future__ import annotations
 import os
 import threading
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
+from functools import partial
 from math import ceil
 from statistics import median
 
@@ -42,6 +43,9 @@ from ahf_ros.text import counted
 
 LOOKED_AT = 3
 """Images that are worth a second look, where nothing is identified in many."""
+
+TOGETHER = 8
+"""Images that are worth one together, where those say nothing."""
 
 IN_A_ROW = 5
 """Images of a stream without a target, after which one of them gets a second look."""
@@ -74,6 +78,20 @@ def advice(image: np.ndarray, settings: DetectorSettings, expected_targets: int 
     check_image(image)
     part = _with_most_dots(as_gray(image), _MAXIMUM_PIXELS, settings)
     return list(filter(None, _lines(part, settings, expected_targets)))
+
+
+def advice_together(
+    images: Iterable[np.ndarray], settings: DetectorSettings, expected_targets: int = 0
+) -> list[str]:
+    """Return lines on the rings that gray images show together in which nothing was identified.
+
+    A few rings in each of several images may tell their family where those of one do not. Images
+    of many dots, as of texture, do not count. The arguments are as for `advice`.
+    """
+    parts = (_with_most_dots(as_gray(image), _MAXIMUM_PIXELS, settings) for image in images)
+    dots = [of for of in map(partial(dots_in, settings=settings), parts) if _are_few(of)]
+    learnt = _learnt(dots)
+    return list(filter(None, _of_bands(learnt, 1, settings, expected_targets) if learnt else ()))
 
 
 class Adviser:
@@ -113,7 +131,7 @@ def _lines(image: np.ndarray, settings: DetectorSettings, expected: int) -> Iter
     if repeated := repeated_targets(read):
         yield repeated_remark(repeated)
         return
-    if learnt := _learnt(dots):
+    if learnt := _learnt([dots]):
         yield from _of_bands(learnt, 1, settings, expected)
     if learnt or not few:
         return
@@ -135,7 +153,7 @@ def _lines(image: np.ndarray, settings: DetectorSettings, expected: int) -> Iter
         return
     middle = _with_most_dots(image, _MAXIMUM_ENLARGED, settings)
     middle = cv2.resize(middle, None, fx=_ENLARGED, fy=_ENLARGED, interpolation=cv2.INTER_CUBIC)
-    if learnt := _learnt(dots_in(middle, DetectorSettings())):
+    if learnt := _learnt([dots_in(middle, DetectorSettings())]):
         yield from _of_bands(learnt, _ENLARGED, settings, expected)
     elif small := _identified(middle, replace(settings, max_radius=_largest_told(settings))):
         radius = median(target.semi_major for target in small) / _ENLARGED
@@ -177,9 +195,9 @@ def _are_few(dots: list[DotsOfOctave]) -> bool:
     return not many and sum(len(of.frames) for _, each in dots for of in each) <= _FEW
 
 
-def _learnt(dots: list[DotsOfOctave]) -> LearntFamily | None:
+def _learnt(images: Iterable[list[DotsOfOctave]]) -> LearntFamily | None:
     """Return the family of most dots with a band, if its number of sectors is sure."""
-    families = learn_families(bands_about([dots], _CLEAREST))
+    families = learn_families(bands_about(images, _CLEAREST))
     return families[0] if families and families[0].lead > _SURE else None
 
 

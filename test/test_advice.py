@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 import pytest
 
-from ahf_ros.advice import IN_A_ROW, Adviser, advice
+from ahf_ros.advice import IN_A_ROW, Adviser, advice, advice_together
 from ahf_ros.codes.ring import ring_family
 from ahf_ros.detectors import DetectorSettings
 from ahf_ros.interchange.image_files import write_image
@@ -208,3 +208,22 @@ def test_the_report_has_the_advice(tmp_path, capsys) -> None:
     page = tmp_path / 'report.html'
     assert status('report', tmp_path / 'results.jsonl', '-o', page) == 0
     assert '"advice":["12 dots with a band of 10 sectors: --family cct10"]' in page.read_text()
+
+
+def test_a_few_rings_in_each_of_several_images_are_told_together(tmp_path, capsys) -> None:
+    file = tmp_path / 'mine.yaml'
+    file.write_text('family: mine\nbits: 9\nband: [1.6, 2.4]\nwords: all\n')
+    images = [shown(family='mine', family_file=str(file), targets=4, seed=it) for it in range(6)]
+    assert [line for image in images for line in advice(image, DetectorSettings())] == []
+    line = '24 dots with a band of 9 sectors that no known family has: `ahf learn-family`'
+    line += ' describes it'
+    assert advice_together(images, DetectorSettings()) == [line]
+    assert advice_together(images[:1], DetectorSettings()) == []
+    assert advice_together([texture(), spots(30, 22, 11)], DetectorSettings()) == []
+    for number, image in enumerate(images):
+        write_image(tmp_path / f'{number}.png', image)
+    (tmp_path / '3b.png').write_bytes(b'broken')
+    assert status('identify', tmp_path) == 1
+    said = capsys.readouterr().err
+    assert said.count('dots with a band') == 1
+    assert f'\n6 images together: {line}\n' in said

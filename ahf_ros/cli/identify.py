@@ -10,7 +10,7 @@ import json
 import re
 import sys
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import closing, redirect_stdout
+from contextlib import closing, redirect_stdout, suppress
 from glob import glob, has_magic
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
@@ -36,6 +36,8 @@ from ahf_ros.target import UNDECODED
 from ahf_ros.text import shown
 
 if TYPE_CHECKING:
+    import numpy as np
+
     from ahf_ros.interchange.export.survey import MeasuredImage
 
 _WORTH_PROCESSES = 4  # images; fewer are identified before processes have started
@@ -208,19 +210,25 @@ def _hint(settings: IdentificationSettings, identified: int) -> list[str]:
 
 
 def _advice(paths: Sequence[str], settings: IdentificationSettings) -> list[str]:
-    """Return lines on the first image in which nothing was identified that shows why."""
-    from ahf_ros.advice import LOOKED_AT, advice
+    """Return lines on the first image in which nothing was identified that says why, or on all."""
+    from ahf_ros.advice import LOOKED_AT, TOGETHER, advice, advice_together
+    from ahf_ros.imaging.image import check_image
     from ahf_ros.interchange.image_files import read_image
 
-    known = settings.number or int(settings.estimate_expected)
-    for path in paths[:LOOKED_AT]:
-        try:
-            lines = advice(read_image(path), settings.detection, known)
-        except ValueError:  # which the identification has said
-            continue
-        if lines:
+    def images(of: Sequence[str]) -> Iterator[tuple[str, np.ndarray]]:
+        for path in of:
+            with suppress(ValueError):  # which the identification has said
+                image = read_image(path)
+                check_image(image)
+                yield path, image
+
+    wanted = settings.detection, settings.number or int(settings.estimate_expected)
+    for path, image in images(paths[:LOOKED_AT]):
+        if lines := advice(image, *wanted):
             return [f'{path}: {line}' for line in lines]
-    return []
+    some = paths[:TOGETHER] if len(paths) > 1 else ()
+    lines = advice_together((image for _, image in images(some)), *wanted)
+    return [f'{len(some)} images together: {line}' for line in lines]
 
 
 def _tasks(
