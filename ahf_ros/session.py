@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ahf_ros.codes.families import AUTO, mirrored_number
+from ahf_ros.codes.families import AUTO, kind_of, mirrored_number
 from ahf_ros.deprecation import deprecated_arguments
 from ahf_ros.detectors import (
     Contesting,
@@ -100,7 +100,7 @@ def create_identifier(
             used,
             settings,
             interrupt,
-            families=used.families,
+            kinds={it: kind_of(it, settings.detection.family_file) for it in used.families},
             narrowed=narrowed,
         )
     return _identifier(Identifier, used, settings, interrupt)

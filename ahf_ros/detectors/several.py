@@ -1,7 +1,9 @@
 """Identification of families of several kinds, each by the detector of its kind.
 
 What a detector takes for a target may be a part of another one: the dot of a ring may be one dot
-of many. A place belongs to one target, the surer one, of equally sure ones the larger.
+of many. A place belongs to one target, the surer one, of equally sure ones the larger. Where all
+families are looked for and one detector finds targets of its own beyond doubt, the next ones look
+at an image in which these are painted over, which takes them a fraction of the time.
 """
 
 from __future__ import annotations
@@ -14,6 +16,7 @@ from typing import ClassVar
 import numpy as np
 
 from ahf_ros.codes.designs import relative_reach
+from ahf_ros.codes.families import AUTO
 from ahf_ros.detectors.claims import owners
 from ahf_ros.detectors.contract import (
     Contesting,
@@ -25,8 +28,10 @@ from ahf_ros.detectors.contract import (
     Refiner,
     Searching,
 )
+from ahf_ros.detectors.evidence import is_clear
+from ahf_ros.detectors.explained import without_targets
 from ahf_ros.features.common_search import CommonSearch
-from ahf_ros.features.pyramid import image_pyramid
+from ahf_ros.features.pyramid import ImagePyramid, image_pyramid
 from ahf_ros.imaging.image import as_gray, check_image
 from ahf_ros.target import UNDECODED, DottedTarget, Target, sorted_targets
 
@@ -64,13 +69,13 @@ class SeveralDetector:
 
     def __call__(self, image: np.ndarray) -> list[Target]:
         """Identify the targets of one image; see `Detector`."""
-        return self._merged(self._found(image, lambda it: it(image)))
+        return self._merged(self._found(image, lambda it, shown: it(shown)))
 
     def draft(self, image: np.ndarray) -> list[Target]:
         """Identify targets as a call does, with rough centres where a detector is faster so."""
 
-        def drafted(it: Detector) -> list[Target]:
-            return it.draft(image) if isinstance(it, Drafter) else it(image)
+        def drafted(it: Detector, shown: np.ndarray) -> list[Target]:
+            return it.draft(shown) if isinstance(it, Drafter) else it(shown)
 
         return self._merged(self._found(image, drafted))
 
@@ -100,19 +105,31 @@ class SeveralDetector:
         return self.narrow(families)
 
     def _found(
-        self, image: np.ndarray, alone: Callable[[Detector], list[Target]]
+        self, image: np.ndarray, alone: Callable[[Detector, np.ndarray], list[Target]]
     ) -> list[list[Target]]:
         """Return the targets of each detector; those that search for dots do so together."""
         check_image(image)
-        if sum(isinstance(it, Searching) for it in self.parts) < 2:
-            return [alone(it) for it in self.parts]
-        pyramid = replace(
+        searching = sum(isinstance(it, Searching) for it in self.parts) > 1
+        left, pyramid = image, self._pyramid(image) if searching else None
+        results: list[list[Target]] = []
+        for part in self.parts:
+            if left.min() == left.max():  # all that there was is painted over
+                results.append([])
+            elif pyramid and isinstance(part, Searching):
+                results.append(part.search(pyramid))
+            else:
+                results.append(alone(part, left))
+            if self.family == AUTO and is_clear(results[-1]):
+                left = without_targets(left, [it for it in results[-1] if it.id != UNDECODED])
+                pyramid = self._pyramid(left) if searching else None
+        return results
+
+    def _pyramid(self, image: np.ndarray) -> ImagePyramid:
+        """Return the pyramid of an image that detectors share."""
+        return replace(
             image_pyramid(as_gray(image), self.settings.max_radius),
             common=CommonSearch(self.settings.radii[0], self.settings.polarities),
         )
-        return [
-            it.search(pyramid) if isinstance(it, Searching) else alone(it) for it in self.parts
-        ]
 
     def _merged(self, results: Sequence[Sequence[Target]]) -> list[Target]:
         """Return the targets of all detectors that own their places."""

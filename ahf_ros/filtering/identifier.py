@@ -73,12 +73,16 @@ class Memory:
         The families that were found so far; empty unless they are to be settled.
     shown : int
         How many images have settled them, see `ahf_ros.filtering.settling`.
+    glanced : int
+        In how many parts of images other families have been looked for since; -1 where the next
+        image is looked at as a whole.
     """
 
     filter: Values | None = None
     settled: tuple[int, int] | None = None
     families: tuple[str, ...] = ()
     shown: int = 0
+    glanced: int = 0
 
 
 @dataclass(frozen=True, slots=True)

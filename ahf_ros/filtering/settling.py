@@ -1,45 +1,52 @@
 """Which families of targets images show, settled on the first of them.
 
-All families are looked for in the first images, as received. From then on only those that were
-found are looked for, and all again in an image that does not clearly show one of these.
+All families are looked for in the first images, as received, until it is clear which are there:
+mostly in one. From then on only those that were found are looked for, and all again in an image
+that does not clearly show one of these. Each image that does has a part of it looked at for all
+others, where its targets are painted over; what is there shows itself within some images, and
+none of them takes much longer.
 """
 
 from __future__ import annotations
 
 import math
-from collections import defaultdict
-from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import fields, replace
+from functools import partial
 from itertools import chain
 from typing import Any
 
+import cv2
 import numpy as np
 
 from ahf_ros.blas import one_blas_thread
 from ahf_ros.deprecation import deprecated_arguments
+from ahf_ros.detectors.evidence import Reading, evidence, is_clear, reading_of
+from ahf_ros.detectors.explained import without_targets
 from ahf_ros.filtering.identifier import Identifier, Memory
 from ahf_ros.filtering.trials import DetectorFunction, Trials
 from ahf_ros.imaging.stack import ImageStack
 from ahf_ros.notices import said_once
 from ahf_ros.target import UNDECODED, Identification, Target, UndecodedTarget
+from ahf_ros.target_check import checked_targets
 
 FIRST = 3
-"""Images with targets in which all families are looked for."""
+"""Images with targets in which all families are looked for, unless one makes it clear."""
 
 _OF_ONE = 2.0  # decimal logarithm of the odds on a family: one target certain to 0.99
 _OF_SEVERAL = 3.6  # ... of all together: three certain to 0.94, or two to 0.984
+_WORTH_A_LOOK = 1.3  # ... on another family in a part of an image: one certain to 0.95
 _PER_IMAGE = 0.3  # words that texture shows by chance in an image, at the most
 _OF_KNOWN = 1.99  # ... on families that other images have settled: one certain to 0.99
-_DOUBTFUL = 0.9  # confidence up to which words are read in nearly any texture
-_CERTAIN = 1e-3  # probability that a target is wrong, below which it counts for no more
 
-Reading = tuple[str, int, float]
-"""Family, ID and confidence of a target."""
+_WHOLE_KINDS = ('ring',), ('aruco', 'apriltag')  # of which a part may show too few
+_PART = 480  # side of a part of an image in which other families are looked for, px, at least
+_PARTS = 4  # of an image in a row and in a column, at the most; neighbours share a third
 
 
 def memory_of(families: Sequence[str]) -> Memory:
     """Return what earlier images leave that have settled these families, if there are any."""
-    return Memory(families=tuple(families), shown=FIRST if families else 0)
+    return Memory(families=tuple(families), shown=FIRST if families else 0, glanced=-1)
 
 
 def evident(targets: Sequence[Target]) -> list[Target]:
@@ -52,7 +59,7 @@ def evident(targets: Sequence[Target]) -> list[Target]:
     """
     shown = {
         family
-        for family, of in _evidence(map(_reading, targets)).items()
+        for family, of in evidence(map(reading_of, targets)).items()
         if max(of) > _OF_ONE or sum(of) > _OF_SEVERAL
     }
     return [it for it in targets if it.id == UNDECODED or it.family in shown]
@@ -88,7 +95,7 @@ def evident_together(images: Sequence[Iterable[Reading]]) -> set[str]:
     by_chance = max(math.log10(_PER_IMAGE * len(images)), 0.0) if images else 0.0
     return {
         family
-        for family, of in _evidence(chain.from_iterable(images)).items()
+        for family, of in evidence(chain.from_iterable(images)).items()
         if sum(max(odds - by_chance, 0.0) for odds in of) > _OF_SEVERAL
     }
 
@@ -98,28 +105,35 @@ def still_shown(targets: Sequence[Target]) -> bool:
 
     A doubtful word may be read in a target of another family.
     """
-    return any(sum(of) > _OF_KNOWN for of in _evidence(map(_reading, targets)).values())
-
-
-def _reading(target: Target) -> Reading:
-    return target.family, target.id, target.confidence
-
-
-def _evidence(readings: Iterable[Reading]) -> dict[str, list[float]]:
-    """Return the decimal logarithms of the odds that readings are right, by family."""
-    surest: defaultdict[tuple[str, int], float] = defaultdict(float)
-    for family, number, confidence in readings:
-        if number != UNDECODED:
-            surest[family, number] = max(surest[family, number], confidence)
-    evidence: defaultdict[str, list[float]] = defaultdict(list)
-    for (family, _), confidence in surest.items():
-        if confidence > _DOUBTFUL:
-            evidence[family].append(-math.log10(max(1 - confidence, _CERTAIN)))
-    return evidence
+    return any(sum(of) > _OF_KNOWN for of in evidence(map(reading_of, targets)).values())
 
 
 def _families(targets: Iterable[Target]) -> set[str]:
     return {target.family for target in targets if target.id != UNDECODED}
+
+
+def _parts(image: np.ndarray) -> list[Callable[[], np.ndarray]]:
+    """Return what makes parts of an image that overlap, and the whole in their size."""
+    height, width = image.shape
+    rows, columns = _spans(height), _spans(width)
+    parts = [partial(image.__getitem__, (row, column)) for row in rows for column in columns]
+    if len(parts) == 1:
+        return [lambda: image]
+    size = columns[0].stop, rows[0].stop
+    scale = min(size[0] / width, size[1] / height)
+    whole = partial(cv2.resize, image, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
+    return [*parts, whole]
+
+
+def _spans(side: int) -> list[slice]:
+    """Return the parts of a side, px."""
+    length = max(_PART, math.ceil(3 * side / (2 * _PARTS + 1)))
+    if side <= length:
+        return [slice(0, side)]
+    count = math.ceil(1 + 3 * (side - length) / (2 * length))
+    return [
+        slice(start, start + length) for start in np.linspace(0, side - length, count, dtype=int)
+    ]
 
 
 def _beside(
@@ -152,8 +166,8 @@ class SettlingIdentifier(Identifier):
     ----------
     detector, *arguments, draft, **options
         As for `Identifier`, with a detector of all families.
-    families : sequence of str
-        Their names.
+    kinds : mapping of str to str
+        The names of the families, and the kind of each.
     narrowed : callable
         From some of them to an identifier that has their detector.
     """
@@ -163,7 +177,7 @@ class SettlingIdentifier(Identifier):
         detector: DetectorFunction,
         *arguments: Any,
         draft: DetectorFunction | None = None,
-        families: Sequence[str],
+        kinds: Mapping[str, str],
         narrowed: Callable[[tuple[str, ...]], Identifier],
         **options: Any,
     ) -> None:
@@ -171,7 +185,7 @@ class SettlingIdentifier(Identifier):
         super().__init__(
             lambda image: marked(detector(image)), *arguments, draft=drafted, **options
         )
-        self._families = families
+        self._kinds = kinds
         self._narrowed = narrowed
         self._made: dict[tuple[str, ...], Identifier] = {}
         self._looked: Trials | None = None
@@ -188,18 +202,20 @@ class SettlingIdentifier(Identifier):
         known, found = self.memory.families, None
         if self.memory.shown >= FIRST:
             found = self._read(stack, known, expected_targets)
-        if not (found and still_shown(found.targets)):
-            seen = self._look(stack)
-            families = self._ordered({*known, *_families(seen)})
-            if not families:
-                found = super().identify(stack, expected_targets=expected_targets)
-                families = self._ordered(_families(found.targets))
-            elif not found or families != known:
-                found = self._read(stack, families, expected_targets)
+        settled = found is not None and still_shown(found.targets)
+        seen = self._glance(stack, found) if found and settled else self._look(stack)
+        families = self._ordered({*known, *_families(seen)})
+        if not families:
+            found = super().identify(stack, expected_targets=expected_targets)
+            families = self._ordered(_families(found.targets))
+        elif found is None or families != known:
+            found = self._read(stack, families, expected_targets)
+        if seen or not settled:
             unsettled = tuple(_beside(seen, found.targets, families))
             found = replace(found, looked_for=self._looked_for, unsettled=unsettled)
-            shown = min(self.memory.shown + (found.count > 0), FIRST)
-            self.memory = replace(self.memory, families=families, shown=shown)
+        clear = is_clear([*found, *found.unsettled])
+        shown = self.memory.shown + (FIRST if clear else found.count > 0)
+        self.memory = replace(self.memory, families=families, shown=min(shown, FIRST))
         self._looked = None
         state = replace(found.filter, duration=self._clock() - started)
         return replace(found, filter=state)
@@ -212,6 +228,37 @@ class SettlingIdentifier(Identifier):
                 return trials.targets[plain]
         return trials.targets[trials.plain[0]]
 
+    def _glance(self, stack: ImageStack, found: Identification) -> list[Target]:
+        """Return what an image shows beside its targets, if a look at a part shows something.
+
+        Each image gets another look, those of a batch one at the whole.
+        """
+        turn = self.memory.glanced
+        self.memory = replace(self.memory, glanced=turn + 1)
+        image = stack.combined(found.combination or stack.names[0])
+        left = without_targets(image, [it for it in found.targets if it.id != UNDECODED])
+        parts = _parts(left) if turn >= 0 else [lambda: left]
+        looks = [lambda it=it: self._seen(it()) for it in parts]
+        if len(parts) > 1:  # where few may not tell which of several families it is
+            looks += [partial(self._of_kinds, kinds, left) for kinds in _WHOLE_KINDS]
+        seen = looks[turn % len(looks)]()
+        if len(looks) > 1:
+            odds = evidence(map(reading_of, seen))
+            kinds = {self._kinds[name] for name, of in odds.items() if sum(of) > _WORTH_A_LOOK}
+            seen = self._of_kinds(kinds, left) if kinds else []
+        return [it for it in seen if reading_of(it)[0] not in (*self.memory.families, '')]
+
+    def _seen(self, image: np.ndarray) -> list[Target]:
+        """Return what an image shows of all families."""
+        if image.min() == image.max():
+            return []
+        return list(checked_targets(self._detector(image), self._name))
+
+    def _of_kinds(self, kinds: Collection[str], image: np.ndarray) -> list[Target]:
+        """Return what an image shows of the families of some kinds."""
+        names = tuple(name for name, kind in self._kinds.items() if kind in kinds)
+        return marked(self._reader(names).seen(ImageStack((image,)))) if names else []
+
     def _trials(self, stack: ImageStack) -> Trials:
         """Return what is known of an image or stack that was looked at."""
         return self._looked or super()._trials(stack)
@@ -220,14 +267,18 @@ class SettlingIdentifier(Identifier):
         self, stack: ImageStack, families: tuple[str, ...], expected: int | None
     ) -> Identification:
         """Return what an image shows of some families, and remember it."""
-        if families not in self._made:
-            self._made[families] = self._narrowed(families)
-        identifier = self._made[families]
+        identifier = self._reader(families)
         identifier.memory = self.memory
         found = identifier.identify(stack, expected_targets=expected)
         self.memory, self.last_search = identifier.memory, identifier.last_search
         return found
 
+    def _reader(self, families: tuple[str, ...]) -> Identifier:
+        """Return what identifies targets of some families, the same one each time."""
+        if families not in self._made:
+            self._made[families] = self._narrowed(families)
+        return self._made[families]
+
     def _ordered(self, families: set[str]) -> tuple[str, ...]:
         """Return families in one order, whatever images they come from."""
-        return tuple(name for name in self._families if name in families)
+        return tuple(name for name in self._kinds if name in families)

@@ -4,18 +4,24 @@ from __future__ import annotations
 
 import json
 import math
+from collections import Counter
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
 import pytest
 
-from ahf_ros.filtering.settling import evident, evident_together
+from ahf_ros.detectors import create_detector
+from ahf_ros.detectors.explained import without_targets
+from ahf_ros.filtering.settling import FIRST, evident, evident_together
 from ahf_ros.interchange.image_files import write_image
-from ahf_ros.session import identify
+from ahf_ros.session import create_identifier, identify
 from ahf_ros.synthetic.scene import SceneSettings, render
 from ahf_ros.target import Target
+from support.calls import calls_of
 from support.command_line import status
 
 SOFT = (1, 2, 4, 6)
@@ -90,3 +96,91 @@ def test_photographs_of_one_target_each_settle_its_family_together(
     assert status('identify', tmp_path / f'{empty}.png', '--json') == 0
     (alone,) = map(json.loads, capsys.readouterr().out.splitlines())
     assert (alone['targets'], len(alone['unsettled'])) == ([], 1)
+
+
+WALL = SceneSettings(width=1200, height=900, targets=12, dot_radius=9, seed=3)
+
+
+def side_by_side(*families: str, **changes: Any) -> np.ndarray:
+    return np.hstack(
+        [
+            render(replace(WALL, width=600, targets=8, family=it, **changes)).image
+            for it in families
+        ]
+    )
+
+
+@pytest.mark.parametrize('light', ['normal', 'stripe'])
+def test_a_clear_image_settles_its_family_at_once_and_later_ones_cost_less(
+    light: str,
+) -> None:
+    image = render(replace(WALL, light=light)).image
+    identifier = create_identifier(threads=1)
+    named = create_identifier(family='metashape12', threads=1)
+    for each in (identifier, named):
+        each.identify(image[:300, :300])  # modules are imported, tables made
+        each.reset()
+    found = []
+    first = calls_of(lambda: found.append(identifier.identify(image)))
+    assert (found[0].looked_for, found[0].count) == ('auto', 12)
+    assert (identifier.memory.families, identifier.memory.shown) == (('metashape12',), FIRST)
+    later = calls_of(lambda: identifier.identify(image))
+    assert later < 0.6 * first
+    assert later < 3 * calls_of(lambda: named.identify(image))
+    assert identifier.identify(image).targets == named.identify(image).targets
+
+
+@pytest.mark.parametrize('light', ['normal', 'stripe'])
+@pytest.mark.parametrize(
+    ('first', 'second'),
+    [
+        ('metashape12', 'apriltag_36h11'),
+        ('aruco_4x4_50', 'cct12'),
+        ('metashape12', 'aicon14'),
+        ('metashape12', 'gsi'),
+        ('cct10', 'cctag3'),
+    ],
+)
+def test_a_family_that_appears_in_a_stream_is_found(first: str, second: str, light: str) -> None:
+    size = {'gsi': 4, 'cctag3': 24}.get(second, 12)
+    own = render(replace(WALL, width=600, targets=4, family=first, light=light))
+    more = replace(WALL, width=600, targets=4, dot_radius=size, seed=5, light=light)
+    other = render(replace(more, family=second))
+    alone = np.hstack([own.image, render(replace(more, targets=0)).image])
+    both = np.hstack([own.image, other.image])
+    identifier = create_identifier()
+    for image in (alone, alone):
+        assert {it.family for it in identifier.identify(image)} == {first}
+    assert identifier.memory.families == (first,)
+    found = identifier.identify(both)
+    while identifier.memory.families == (first,) and identifier.memory.glanced <= 13:
+        found = identifier.identify(both)
+    assert [it.key for it in found if it.family == second] == [it.key for it in other.targets]
+    assert set(identifier.memory.families) == {first, second}
+    found = identifier.identify(both)
+    assert set(found.looked_for.split(',')) == {first, second}
+
+
+def test_a_second_family_in_any_image_of_a_batch_is_found(
+    tmp_path: Path, capsys: pytest.CaptureFixture
+) -> None:
+    alone, both = side_by_side('cct10', 'cct10'), side_by_side('cct10', 'aruco_5x5_50')
+    for number, image in enumerate([alone, alone, alone, alone, both]):
+        write_image(tmp_path / f'{number}.png', image)
+    assert status('identify', tmp_path, '--json') == 0
+    said = capsys.readouterr()
+    last = json.loads(said.out.splitlines()[-1])
+    assert Counter(it['family'] for it in last['targets']) == {'cct10': 8, 'aruco_5x5_50': 8}
+    assert 'families: aruco_5x5_50, cct10\n' in said.err
+
+
+@pytest.mark.parametrize('light', ['normal', 'stripe'])
+@pytest.mark.parametrize('family', ['metashape12', 'apriltag_36h11', 'dots', 'cctag3'])
+def test_nothing_is_left_of_targets_that_are_painted_over(family: str, light: str) -> None:
+    size = 24 if family == 'cctag3' else 12
+    scene = render(replace(WALL, family=family, light=light, targets=6, dot_radius=size))
+    left = without_targets(scene.image, scene.targets)
+    assert create_detector()(left) == []
+    assert not np.array_equal(left, scene.image)
+    again = without_targets(scene.image.astype(np.float32), scene.targets)
+    assert np.abs(again - left).max() <= 0.5

@@ -1,0 +1,76 @@
+"""Images without the targets that are known, so that only what is left is looked at."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from math import hypot
+
+import numpy as np
+
+from ahf_ros.codes.designs import relative_reach
+from ahf_ros.features.frame import affine_frames
+from ahf_ros.target import DottedTarget, Target
+
+_MARGIN = 1.15  # times the reach of a target, within which the blur of its edges is
+_ANGLES = 64  # in which the surroundings of a target are looked at
+
+
+def without_targets(image: np.ndarray, targets: Iterable[Target]) -> np.ndarray:
+    """Return an image in which targets are painted over with the light about them.
+
+    Parameters
+    ----------
+    image : ndarray, shape (height, width)
+    targets : iterable of Target
+
+    Returns
+    -------
+    ndarray
+        Of the same shape and type. From the edge of what is painted over to its centre, gray
+        values pass smoothly from those of the surroundings to their median, so that there is no
+        edge.
+
+    Examples
+    --------
+    >>> from ahf_ros import SceneSettings, identify, render
+    >>> image = render(SceneSettings(width=320, height=240, targets=3, dot_radius=8)).image
+    >>> found = identify(image, family='metashape12')
+    >>> len(found), len(identify(without_targets(image, found), family='metashape12'))
+    (3, 0)
+    """
+    left = image.copy()
+    height, width = image.shape
+    angles = np.arange(_ANGLES) * 2 * np.pi / _ANGLES
+    for target in targets:
+        (frame,) = affine_frames(*np.atleast_2d([target.x, target.y, *_reach(target)]).T)
+        rim = np.column_stack([np.cos(angles), np.sin(angles), np.ones(_ANGLES)]) @ frame.T
+        x, y = np.rint(rim[:, :2].T).astype(int)
+        about = image[y.clip(0, height - 1), x.clip(0, width - 1)].astype(float)
+        rows = slice(max(y.min(), 0), max(y.max() + 1, 0))
+        columns = slice(max(x.min(), 0), max(x.max() + 1, 0))
+        part = left[rows, columns]
+        if not part.size:
+            continue
+        inverse = np.linalg.inv(frame)
+        down, right = np.ogrid[rows, columns][:2]
+        down, right = down[: len(part)], right[:, : part.shape[1]]
+        across, along = (
+            inverse[row, 0] * right + inverse[row, 1] * down + inverse[row, 2] for row in (0, 1)
+        )
+        outwards = across**2 + along**2  # 1 on the rim
+        inside = outwards < 1
+        turn = np.arctan2(along, across)[inside] % (2 * np.pi)
+        rim_values = np.interp(turn, angles, about, period=2 * np.pi)
+        middle = np.median(about)
+        painted = middle + outwards[inside] * (rim_values - middle)
+        part[inside] = painted.astype(image.dtype) if image.dtype.kind == 'f' else np.rint(painted)
+    return left
+
+
+def _reach(target: Target) -> tuple[float, float, float]:
+    """Return semi-axes, px, and direction, rad, of an ellipse that holds a target."""
+    times = relative_reach(target.family)
+    if isinstance(target, DottedTarget) and target.dots:
+        away = max(hypot(x - target.x, y - target.y) + size for x, y, size, *_ in target.dots)
+        return _MARGIN * away, _MARGIN * away, 0.0
+    return _MARGIN * times * target.semi_major, _MARGIN * times * target.semi_minor, target.angle
