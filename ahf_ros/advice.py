@@ -153,6 +153,7 @@ def _lines(image: np.ndarray, settings: DetectorSettings, expected: int) -> Iter
         return
     middle = _with_most_dots(image, _MAXIMUM_ENLARGED, settings)
     middle = cv2.resize(middle, None, fx=_ENLARGED, fy=_ENLARGED, interpolation=cv2.INTER_CUBIC)
+    middle = np.maximum(middle, 0)  # which cubic interpolation falls below
     if learnt := _learnt([dots_in(middle, DetectorSettings())]):
         yield from _of_bands(learnt, _ENLARGED, settings, expected)
     elif small := _identified(middle, replace(settings, max_radius=_largest_told(settings))):

@@ -42,6 +42,8 @@ class Target:
     edge_shift : float, optional
         Length by which dark areas are larger in the image than in the print, on every edge, px:
         positive where ink has grown, negative where light has. None where it was not measured.
+    polarity : int
+        1 for a dark dot on bright ground, -1 for a bright one on dark, 0 where it is unknown.
 
     Examples
     --------
@@ -61,11 +63,17 @@ class Target:
     family: str = ''
     # By name only, so that the fields of the classes below follow `family` in their order.
     edge_shift: float | None = field(default=None, kw_only=True)
+    polarity: int = field(default=0, kw_only=True)
 
     @property
     def key(self) -> tuple[str, int]:
-        """Family and ID, which no two targets share."""
+        """Family and ID, which no two targets of one colour share."""
         return self.family, self.id
+
+    @property
+    def print(self) -> tuple[str, int, int]:
+        """Family, ID and polarity, which no two targets share."""
+        return self.family, self.id, self.polarity
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,8 +88,6 @@ class DottedTarget(Target):
         the code.
     template_dots : int
         Number of the former.
-    polarity : int
-        1 for dark dots on bright ground, -1 for bright ones on dark.
 
     Examples
     --------
@@ -93,7 +99,6 @@ class DottedTarget(Target):
 
     dots: tuple[tuple[float, float, float, float, float], ...] = ()
     template_dots: int = 0
-    polarity: int = 1
 
 
 @dataclass(frozen=True, slots=True)
@@ -343,7 +348,7 @@ class Identification:
 
     @property
     def count(self) -> int:
-        """n, the number of distinct targets identified, by family and ID."""
+        """n, the number of distinct targets identified, by family, ID and colour."""
         return count_codes(self.targets)
 
     @property
@@ -398,10 +403,10 @@ def sorted_targets(targets: Iterable[Target]) -> list[Target]:
 def repeated_targets(targets: Iterable[Target]) -> tuple[UndecodedTarget, ...]:
     """Return the contested targets that have their likely ID in common with another one."""
     contested = [it for it in targets if isinstance(it, UndecodedTarget) and it.is_contested]
-    counts = Counter((it.likely_family, it.likely_id) for it in contested)
-    return tuple(it for it in contested if counts[it.likely_family, it.likely_id] > 1)
+    counts = Counter((it.likely_family, it.likely_id, it.polarity) for it in contested)
+    return tuple(it for it in contested if counts[it.likely_family, it.likely_id, it.polarity] > 1)
 
 
 def count_codes(targets: Iterable[Target]) -> int:
-    """Return the number of distinct targets by family and ID, undecoded ones excluded."""
-    return len({target.key for target in targets if target.id != UNDECODED})
+    """Return the number of distinct targets by family, ID and colour, undecoded ones excluded."""
+    return len({target.print for target in targets if target.id != UNDECODED})

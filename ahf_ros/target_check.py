@@ -53,9 +53,9 @@ def checked_target(target: Any, name: str) -> Target:
 
     Accepted are an `id` from -1 to 2^31 - 1, a `code` from 0 to 2^32 - 1, finite coordinates and
     semi-axes, an `angle` within a turn, a `confidence` from 0 to 1, a covariance that is symmetric
-    and positive semidefinite, a `family` that is a printable text, and an `edge_shift` that is
-    None or a number of px; numpy scalars and arrays are converted. A ValueError names the target
-    as `name` does, the field, its value and what is accepted.
+    and positive semidefinite, a `family` that is a printable text, an `edge_shift` that is None or
+    a number of px, and a `polarity` of -1, 0 or 1; numpy scalars and arrays are converted. A
+    ValueError names the target as `name` does, the field, its value and what is accepted.
     """
     if not isinstance(target, Target):
         raise ValueError(f'{name} is {shown(target)}, accepted is a Target')
@@ -166,4 +166,5 @@ _CHECKS: dict[str, Callable[[Any, str], Any]] = {
     'covariance': _covariance,
     'family': checked_text,
     'edge_shift': lambda value, name: None if value is None else _PLACE(value, name),
+    'polarity': partial(checked_integer, minimum=-1, maximum=1),
 }

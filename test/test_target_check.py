@@ -103,14 +103,17 @@ def test_numbers_of_numpy_are_converted():
         np.array([[1, 0], [0, 2]]),
         np.str_('aicon12'),
         edge_shift=np.float32(-0.5),
+        polarity=np.int8(-1),
     )
     checked = checked_target(target, 'x')
     covariance = (1.0, 0.0, 0.0, 2.0)
     assert checked == Target(
-        7, 9, 10.5, 20.0, 4.0, 3.0, 0.5, 1.0, covariance, 'aicon12', edge_shift=-0.5
+        *(7, 9, 10.5, 20.0, 4.0, 3.0, 0.5, 1.0, covariance, 'aicon12'),
+        edge_shift=-0.5,
+        polarity=-1,
     )
     types = [type(getattr(checked, name)) for name in NAMES]
-    assert types == [int, int, float, float, float, float, float, float, tuple, str, float]
+    assert types == [int, int, float, float, float, float, float, float, tuple, str, float, int]
     assert all(type(it) is float for it in checked.covariance)
 
 

@@ -42,6 +42,7 @@ def targets_from_frames(
     confidence: np.ndarray,
     family: str | np.ndarray,
     edge_shift: np.ndarray | None = None,
+    polarity: np.ndarray | int = 0,
 ) -> list[Target]:
     """Return targets, in the order given, whose places are as for `ellipse_fields`.
 
@@ -50,8 +51,11 @@ def targets_from_frames(
     undecoded = ids == UNDECODED
     columns = (ids, np.where(undecoded, 0, codes), confidence, np.where(undecoded, '', family))
     fields = ellipse_fields(frames, covariance, edge_shift)
-    rows = (*(column.tolist() for column in columns), fields)
+    signs = np.broadcast_to(polarity, len(ids))
+    rows = (*(column.tolist() for column in (*columns, signs)), fields)
     return [
-        Target(id=identifier, code=code, confidence=certainty, family=name, **places)
-        for identifier, code, certainty, name, places in zip(*rows, strict=True)
+        Target(
+            id=identifier, code=code, confidence=certainty, family=name, polarity=sign, **places
+        )
+        for identifier, code, certainty, name, sign, places in zip(*rows, strict=True)
     ]

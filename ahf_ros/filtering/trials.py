@@ -200,17 +200,17 @@ def fused(results: Sequence[Sequence[Target]]) -> list[Target]:
     times as many filters show it as contradict it: as show, without it, another target that its
     dot overlaps, or its ID at another place. Undecoded targets are ignored.
     """
-    by_key: defaultdict[tuple[str, int], list[_Claim]] = defaultdict(list)
+    by_print: defaultdict[tuple[str, int, int], list[_Claim]] = defaultdict(list)
     for index, targets in enumerate(results):
         for target in targets:
             if target.id == UNDECODED:
                 continue
-            same = [claim for claim in by_key[target.key] if claim.near(target)]
+            same = [claim for claim in by_print[target.print] if claim.near(target)]
             if not same:
                 same = [_Claim(target, index)]
-                by_key[target.key] += same
+                by_print[target.print] += same
             same[0].filters.add(index)
-    claims = list(chain.from_iterable(by_key.values()))
+    claims = list(chain.from_iterable(by_print.values()))
     kept = []
     for claim, rivals in zip(claims, _rivals([claim.target for claim in claims]), strict=True):
         against = set().union(*(claims[index].filters for index in rivals)) - claim.filters
@@ -222,7 +222,8 @@ def fused(results: Sequence[Sequence[Target]]) -> list[Target]:
 
 def _rivals(targets: Sequence[Target]) -> Iterator[list[int]]:
     """Yield for each target the indices of those that cannot be right with it."""
-    keys = np.unique([f'{it.family} {it.id}' for it in targets], return_inverse=True)[1]
+    prints = [f'{it.family} {it.id} {it.polarity}' for it in targets]
+    keys = np.unique(prints, return_inverse=True)[1]
     x, y, radius = np.reshape([(it.x, it.y, it.semi_major) for it in targets], (-1, 3)).T
     for index, key in enumerate(keys):
         overlapping = np.hypot(x - x[index], y - y[index]) < radius + radius[index]

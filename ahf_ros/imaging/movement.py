@@ -370,12 +370,12 @@ def targets_moved(
 
     Only targets count that are where the displacement was seen.
     """
-    others = {it.key: it for it in after if it.id != UNDECODED}
+    others = {it.print: it for it in after if it.id != UNDECODED}
     shifts = np.array(
         [
-            (others[it.key].x - it.x, others[it.key].y - it.y)
+            (others[it.print].x - it.x, others[it.print].y - it.y)
             for it in before
-            if it.key in others and moved.covers(it.x, it.y)
+            if it.print in others and moved.covers(it.x, it.y)
         ]
     )
     if len(shifts) < _MINIMUM_TARGETS:

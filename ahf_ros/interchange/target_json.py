@@ -192,8 +192,8 @@ def _of_its_kind(target: Target, item: dict[str, Any], name: str) -> Target:
         template = checked_integer(
             item.get('template_dots', 0), f'{name}: template_dots', 0, len(dots)
         )
-        polarity = checked_integer(item.get('polarity', 1), f'{name}: polarity', -1, 1)
-        return DottedTarget(**known, dots=dots, template_dots=template, polarity=polarity)
+        known['polarity'] = known['polarity'] or 1
+        return DottedTarget(**known, dots=dots, template_dots=template)
     if item.get('corners'):
         border = checked_integer(item.get('border', 1), f'{name}: border', 1, 2)
         return SquareMarker(**known, corners=_rows(item, 'corners', 2, 4, name), border=border)

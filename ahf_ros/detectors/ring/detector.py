@@ -286,7 +286,7 @@ def _read(
 def report(
     hypotheses: Hypotheses, settings: DetectorSettings, contested: bool = False
 ) -> list[Target]:
-    """Return the targets to report: one for each dot, and one for each ID at the most.
+    """Return the targets to report: one for each dot, and one for each ID of a colour at the most.
 
     Certain ones that others contradict are among them, undecoded, if `contested`.
     """
@@ -300,16 +300,15 @@ def report(
     hypotheses = hypotheses.select(hypotheses.certain | whole)
     hypotheses = hypotheses.select(np.argsort(-hypotheses.confidence, kind='stable'))
     names, codes, ids = decoded(hypotheses)
-    keys = np.unique(
-        [f'{name} {number}' for name, number in zip(names, ids, strict=True)], return_inverse=True
-    )[1]
+    prints = zip(names, ids, hypotheses.polarity, strict=True)
+    keys = np.unique([' '.join(map(str, it)) for it in prints], return_inverse=True)[1]
     kept, certain = resolve(hypotheses, keys)
     if not settings.report_undecoded:
         kept = kept & hypotheses.certain if contested else certain
     likely, ids = ids[kept], np.where(certain, ids, UNDECODED)
     some = hypotheses.select(kept)
     columns = (some.frames, some.covariance, ids[kept], codes[kept], some.confidence)
-    targets = targets_from_frames(*columns, names[kept], some.shift)
+    targets = targets_from_frames(*columns, names[kept], some.shift, some.polarity)
     rows = zip(targets, some.certain.tolist(), names[kept].tolist(), likely.tolist(), strict=True)
     return sorted_targets(_explained(*row) for row in rows)
 

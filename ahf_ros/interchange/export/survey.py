@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path, PurePath
 from typing import Any
@@ -140,12 +140,20 @@ def make_survey(
         if path in seen:
             raise ValueError(f'{image.path!r} is there twice, accepted is one result an image')
         seen.add(path)
-    keys = sorted({it.key for image in images for it in image.targets if it.id != UNDECODED})
+    targets = [it for image in images for it in image.targets if it.id != UNDECODED]
+    twofold = {it.key for it in targets if it.polarity > 0}
+    twofold &= {it.key for it in targets if it.polarity < 0}
+    keys = sorted({_point(it, twofold) for it in targets})
     if not keys:
         raise ValueError('no image shows an identified target, accepted is at least one')
-    several = len({family for family, _ in keys}) > 1
-    labels = {key: f'{key[0]}_{key[1]}'.lstrip('_') if several else str(key[1]) for key in keys}
-    photographs = tuple(_photograph(image, labels, origin) for image in images)
+    several = len({family for family, *_ in keys}) > 1
+    labels = {
+        (family, number, colour): f'{family}_{number}'.lstrip('_') + colour
+        if several
+        else f'{number}{colour}'
+        for family, number, colour in keys
+    }
+    photographs = tuple(_photograph(image, labels, twofold, origin) for image in images)
     known = tuple(labels.values())
     if control is None:
         return Survey(photographs, known, {})
@@ -168,31 +176,41 @@ def notes_on(control: Control, survey: Survey) -> list[str]:
     return notes
 
 
+_Point = tuple[str, int, str]  # family, ID, and what tells a bright target from a dark one
+
+
+def _point(target: Target, twofold: Collection[tuple[str, int]]) -> _Point:
+    """Return which point a target is; those whose family and ID have both colours are two."""
+    return (*target.key, '_bright' if target.polarity < 0 and target.key in twofold else '')
+
+
 def _photograph(
-    image: MeasuredImage, labels: Mapping[tuple[str, int], str], origin: float
+    image: MeasuredImage,
+    labels: Mapping[_Point, str],
+    twofold: Collection[tuple[str, int]],
+    origin: float,
 ) -> Photograph:
-    marks: dict[tuple[str, int], Mark] = {}
+    marks: dict[_Point, Mark] = {}
     for target in image.targets:
         if target.id == UNDECODED:
             continue
-        if target.key in marks:
-            raise ValueError(
-                f'{image.path} shows target {labels[target.key]} twice, accepted is once'
-            )
+        point = _point(target, twofold)
+        if point in marks:
+            raise ValueError(f'{image.path} shows target {labels[point]} twice, accepted is once')
         xx, xy, _, yy = target.covariance
         known = (xx, xy, yy) if xx > 0 and yy > 0 else (UNKNOWN_VARIANCE, 0.0, UNKNOWN_VARIANCE)
-        label, x, y = labels[target.key], target.x + origin, target.y + origin
-        marks[target.key] = Mark(label=label, x=x, y=y, covariance=known, target=target)
+        label, x, y = labels[point], target.x + origin, target.y + origin
+        marks[point] = Mark(label=label, x=x, y=y, covariance=known, target=target)
     ordered = tuple(marks[key] for key in sorted(marks))
     return Photograph(image.path, image.width, image.height, image.targets, ordered)
 
 
 def _control_points(
-    points: Mapping[str, np.ndarray], labels: Mapping[tuple[str, int], str]
+    points: Mapping[str, np.ndarray], labels: Mapping[_Point, str]
 ) -> dict[str, np.ndarray]:
     """Return the coordinates by our labels, from those by the labels of the list."""
     by_id = defaultdict(list)
-    for (_, number), label in labels.items():
+    for (_, number, _), label in labels.items():
         by_id[number].append(label)
     ours = set(labels.values())
     found: dict[str, np.ndarray] = {}
