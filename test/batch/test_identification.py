@@ -31,7 +31,8 @@ def test_a_search_ends_with_its_process(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, number: int, ends: type[BaseException]
 ) -> None:
     write_image(tmp_path / 'image.png', render(SCENE).image)
-    settings = updated(IdentificationSettings(), {'expected_targets': 5, 'threads': 2})
+    values = {'family': SCENE.family, 'expected_targets': 5, 'threads': 2}
+    settings = updated(IdentificationSettings(), values)
     calls, passed = itertools.count(1), []
     original = ending.check
 

@@ -51,7 +51,9 @@ def test_edges_that_moved_and_dots_of_other_radii_are_read(
     path, pixels = design(tmp_path, 14.0, shift, radius)
     own = {'family_file': path, 'dot_radius': pixels, 'radius_spread': 0.0, 'gamma': 1.0}
     shown = scene(**own, light=light, seed=6)
-    found = find_rings(image_pyramid(shown.image, 60.0), DetectorSettings(), dot_family())
+    found = find_rings(
+        image_pyramid(shown.image, 60.0), DetectorSettings(family='dots'), dot_family()
+    )
     certain = found.select(found.of_word >= CERTAIN)
     assert set(dot_family().ids(certain.words)) == {target.id for target in shown.targets}
     assert certain.edge_shift == pytest.approx(np.full(len(certain.words), shift), abs=0.1)
