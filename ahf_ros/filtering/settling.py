@@ -39,6 +39,7 @@ _WORTH_A_LOOK = 1.3  # ... on another family in a part of an image: one certain 
 _PER_IMAGE = 0.3  # words that texture shows by chance in an image, at the most
 _OF_KNOWN = 1.99  # ... on families that other images have settled: one certain to 0.99
 
+_IN_TURN = 8  # images, at least, over which the looks at all parts of one are spread
 _WHOLE_KINDS = ('ring',), ('aruco', 'apriltag')  # of which a part may show too few
 _PART = 480  # side of a part of an image in which other families are looked for, px, at least
 _PARTS = 4  # of an image in a row and in a column, at the most; neighbours share a third
@@ -231,7 +232,8 @@ class SettlingIdentifier(Identifier):
     def _glance(self, stack: ImageStack, found: Identification) -> list[Target]:
         """Return what an image shows beside its targets, if a look at a part shows something.
 
-        Each image gets another look, those of a batch one at the whole.
+        Each image gets another look, those of a batch one at the whole; where there are few looks,
+        as at small images, some images get none.
         """
         turn = self.memory.glanced
         self.memory = replace(self.memory, glanced=turn + 1)
@@ -241,7 +243,10 @@ class SettlingIdentifier(Identifier):
         looks = [lambda it=it: self._seen(it()) for it in parts]
         if len(parts) > 1:  # where few may not tell which of several families it is
             looks += [partial(self._of_kinds, kinds, left) for kinds in _WHOLE_KINDS]
-        seen = looks[turn % len(looks)]()
+        every = math.ceil(_IN_TURN / len(looks)) if turn > 0 else 1
+        if turn % every:
+            return []
+        seen = looks[turn // every % len(looks)]()
         if len(looks) > 1:
             odds = evidence(map(reading_of, seen))
             kinds = {self._kinds[name] for name, of in odds.items() if sum(of) > _WORTH_A_LOOK}

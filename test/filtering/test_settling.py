@@ -161,6 +161,18 @@ def test_a_family_that_appears_in_a_stream_is_found(first: str, second: str, lig
     assert set(found.looked_for.split(',')) == {first, second}
 
 
+def test_small_images_are_looked_at_now_and_then() -> None:
+    image = render(replace(WALL, width=400, height=300, targets=3)).image
+    identifier = create_identifier(threads=1)
+    named = create_identifier(family='metashape12', threads=1)
+    for each in (identifier, named, identifier):
+        each.identify(image)
+    usual = calls_of(lambda: named.identify(image))
+    calls = [calls_of(lambda: identifier.identify(image)) for _ in range(8)]
+    assert sum(of > 2 * usual for of in calls) == 1
+    assert sum(of < 1.1 * usual for of in calls) == 7
+
+
 def test_a_second_family_in_any_image_of_a_batch_is_found(
     tmp_path: Path, capsys: pytest.CaptureFixture
 ) -> None:
