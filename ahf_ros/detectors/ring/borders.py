@@ -24,7 +24,7 @@ _CONTRAST = 0.5  # share of the step of a mark, from which a border is seen
 _ERROR, _PIXELS = 0.15, 0.4  # standard deviation of the place of a border, angles and px
 _ANYWHERE = 0.1  # share of borders that light moves
 _UNSEEN = 2.3  # price of an end that is not seen, as of one that is anywhere
-_MOVED = 5.0  # price of a band that is not concentric with its dot
+_MOVED = 8.0  # price of a band that is not concentric with its dot
 _ROBUST = 0.5  # distance of ends, angles, of which a quarter is left
 _RARE = 12.0  # log odds of a cover against a word that no family has
 
@@ -38,20 +38,22 @@ def with_ends(polar: PolarImages, words: Words, overhang: np.ndarray, family: Fa
     inner, outer = family.band
     radii = inner + (outer - inner) * np.tile(DEPTHS, (len(overhang), 1)).T
     levels = np.mean([polar.at(of) for of in radii], axis=0)
-    odds, unseen = _ends(polar, levels, words, overhang, family)
-    other, unseen_of_other = _ends(polar, levels, words.as_they_look(), overhang, family)
+    odds, beside, unseen = _ends(polar, levels, words, overhang, family)
+    other, _, unseen_of_other = _ends(polar, levels, words.as_they_look(), overhang, family)
     ahead = words.ahead + other - odds - _UNSEEN * (unseen_of_other - unseen)
     margin = np.where(words.other == words.words, np.inf, _RARE - ahead)
-    return replace(words, margin=np.minimum(words.margin, margin), coded=words.coded + odds)
+    coded = words.coded + odds + np.maximum(words.beside + beside - odds - _MOVED, 0)
+    return replace(words, margin=np.minimum(words.margin, margin), coded=coded)
 
 
 def _ends(
     polar: PolarImages, levels: np.ndarray, words: Words, overhang: np.ndarray, family: Family
-) -> tuple[np.ndarray, np.ndarray]:
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the log odds that arcs end where the sectors do, against anywhere near, shape (k,).
 
     `levels` are the mean gray values across the band, shape (k, m), at all angles. With the odds
-    come the numbers of ends that nothing hides and that are not seen.
+    come those of a band beside its dot, and the numbers of ends that nothing hides and that are
+    not seen.
     """
     count, (inner, outer) = words.hidden.shape[1], family.band
     phases = np.rint(words.starts * count / (2 * np.pi)).astype(int)
@@ -73,18 +75,17 @@ def _ends(
     away -= median(away, known, 0.0)[:, None]  # frames may be turned by a part of an angle
     error = np.hypot(_ERROR, _PIXELS * count / (np.pi * (inner + outer) * polar.size))[:, None]
     odds = _in_place(away, error, known)
-    moved = np.flatnonzero(_in_place(0 * away, error, known) - odds > _MOVED)
-    if moved.size:
-        some = known[moved]
-        beside = _beside(away[moved], some)
-        odds[moved] = np.maximum(odds[moved], _in_place(beside, error[moved], some) - _MOVED)
+    beside = odds.copy()
+    off = np.flatnonzero(_in_place(0 * away, error, known) > odds)
+    if off.size:
+        beside[off] = _in_place(_aside(away[off], known[off]), error[off], known[off])
     steps = range(-_BESIDE, _BESIDE + 1)
     hidden = np.logical_or.reduce([np.roll(words.hidden, step, axis=1) for step in steps])
     unseen = np.count_nonzero(ends & ~hidden & ~known, axis=1)
-    return odds, unseen
+    return odds, beside, unseen
 
 
-def _beside(away: np.ndarray, known: np.ndarray) -> np.ndarray:
+def _aside(away: np.ndarray, known: np.ndarray) -> np.ndarray:
     """Return how far known ends are away from those of bands beside their dots, all (k, m)."""
     angles = 2 * np.pi * np.arange(away.shape[1]) / away.shape[1]
     sides = np.stack([np.ones_like(angles), np.cos(angles), np.sin(angles)], axis=1)

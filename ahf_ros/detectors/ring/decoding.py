@@ -60,6 +60,8 @@ class Words(ArrayRecord):
     coded : ndarray of float64, shape (k,)
         Log odds of the word against arcs of ink of any length, and covers of any length; with
         where they end, see `borders`.
+    beside : ndarray of float64, shape (k,)
+        By how much these grow if the band may be beside its dot, as far as a lens moves it.
     other : ndarray of int64, shape (k,)
         The sectors as they look, in the same rotation, whether or not a family has that word.
     ahead : ndarray of float64, shape (k,)
@@ -80,6 +82,7 @@ class Words(ArrayRecord):
     margin: np.ndarray
     marked: np.ndarray
     coded: np.ndarray
+    beside: np.ndarray
     other: np.ndarray
     ahead: np.ndarray
     seen: np.ndarray
@@ -100,6 +103,7 @@ class Words(ArrayRecord):
             margin=np.zeros(count),
             marked=np.zeros(count),
             coded=np.zeros(count),
+            beside=np.zeros(count),
             other=np.zeros(count, np.int64),
             ahead=np.zeros(count),
             seen=np.zeros(count),
@@ -186,21 +190,22 @@ def decode(
     if (other != of_best).any():
         of_other = explained(other[:, None], phase[:, None])[-1][:, 0]
     inked, mixed = 2 * shown > last, (shown > 0) & (shown < last)
-    coded = np.zeros(len(read))
+    coded = beside = np.zeros(len(read))
     if arcs:
         of_arcs, borders = _free_paths(turned)
         price = _of_borders(inked, mixed, hidden, borders, _border(turned), family)
         # Covers may be as long as they like, as arcs may.
-        moved = _moved(steps[rows, best], turned)
+        both = np.stack([of_word[0], _moved(steps[rows, best], turned)], axis=2)
         long = of_word[1] + np.float32(1 - _COVERED / _MORE) * more
-        of_lens = _covered_paths(moved[..., None], long[..., None], turned)[:, 0]
-        coded = of_lens.astype(np.float64) - of_arcs - price
+        stiff, moved = _covered_paths(both, long[..., None], turned).T.astype(np.float64)
+        coded, beside = stiff - of_arcs - price, np.maximum(moved - stiff, 0)
     found = Words(
         words=of_best,
         starts=2 * np.pi * phase / angles,
         margin=margin.astype(np.float64),
         marked=score - bare + some.dot,
         coded=coded,
+        beside=beside,
         other=other,
         ahead=of_other - score,
         seen=score,

@@ -20,7 +20,14 @@ from ahf_ros.codes.ring import Family, least_marked
 from ahf_ros.detectors.ring.circles import RAYS, REACH
 from ahf_ros.detectors.ring.known import Explained
 from ahf_ros.detectors.ring.likelihood import FEW_MARKS, band_edges, edge_evidence, growth_by
-from ahf_ros.detectors.ring.polar import DOT, MARGIN, PART, PolarImages, polar_images
+from ahf_ros.detectors.ring.polar import (
+    DOT,
+    MARGIN,
+    PART,
+    PolarImages,
+    on_dark_ground,
+    polar_images,
+)
 from ahf_ros.features import frame
 from ahf_ros.features.circle_fit import ENOUGH, NO_FITS, Fit, fit_dots
 from ahf_ros.features.dot_search import voted_dots, whole_dots
@@ -182,7 +189,7 @@ def _bounds(
 ) -> np.ndarray:
     """Return the same for some numbers of sectors in one band, shape (numbers, k)."""
     angles = _PER_SECTOR * max(bits)
-    polar = polar_images(gray, dots, band, angles, _CIRCLES)
+    polar = on_dark_ground(polar_images(gray, dots, band, angles, _CIRCLES), band)
     tried = shifts or np.linspace(-_MAXIMUM_SHIFT, _MAXIMUM_SHIFT, _SHIFTS)
     every = polar.repeated(len(tried))
     growth = growth_by(np.repeat(tried, len(polar.size)), every.size)
