@@ -6,6 +6,7 @@ from argparse import ArgumentParser, Namespace
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import NamedTuple
 
 from ahf_ros import ending
 from ahf_ros.cli import say, tell
@@ -14,8 +15,36 @@ from ahf_ros.interchange.image_files import write_image
 from ahf_ros.interchange.truth_files import read_truth, write_truth
 from ahf_ros.settings.nested import flat_parameters
 from ahf_ros.settings.parameter import Parameter
-from ahf_ros.synthetic.scene import SceneSettings, render
+from ahf_ros.synthetic.bent.picture import BentRendering, render_bent
+from ahf_ros.synthetic.bent.settings import BentSettings
+from ahf_ros.synthetic.scene import Rendering, SceneSettings, render
 from ahf_ros.target import TrueTarget
+
+_MAKERS: dict[str, type[SceneSettings | BentSettings]] = {
+    'wall': SceneSettings,
+    'bent': BentSettings,
+}
+"""Settings by the name of what makes pictures of them."""
+
+
+class _Picture(NamedTuple):
+    """A picture to make; only a wall has phases."""
+
+    scene: SceneSettings | BentSettings
+    phase: int = 0
+
+    @property
+    def name(self) -> str:
+        """Its file."""
+        name = f'{self.scene.light}_{self.scene.ambient:g}_{self.scene.seed}'
+        several = isinstance(self.scene, SceneSettings) and self.scene.phases > 1
+        return name + (f'_{self.phase}.png' if several else '.png')
+
+    def made(self) -> Rendering | BentRendering:
+        """Return the picture and its truth."""
+        if isinstance(self.scene, SceneSettings):
+            return render(self.scene, self.phase)
+        return render_bent(self.scene)
 
 
 def add_arguments(parser: ArgumentParser) -> None:
@@ -29,46 +58,75 @@ def add_arguments(parser: ArgumentParser) -> None:
     )
     text = 'Number of images for each light, with consecutive seeds.'
     add_option(parser, Parameter('count', 1, text, minimum=1))
-    for item in flat_parameters(SceneSettings):
+    choice = Parameter(
+        'maker',
+        'wall',
+        'What makes the pictures: wall, of a flat wall; bent, of bent sheets, ray by ray, with '
+        'motion, gloss, grain and a real lens.',
+        choices=tuple(_MAKERS),
+    )
+    add_option(parser, choice)
+    groups = {
+        maker: parser.add_argument_group(maker, f'Only with --maker {maker}.') for maker in _MAKERS
+    }
+    for item in dict.fromkeys(item for of in _MAKERS.values() for item in flat_parameters(of)):
+        makers = _makers_with(item)
+        group = parser if len(makers) > 1 else groups[makers[0]]
         if item.name == 'light':
-            add_option(parser, item, nargs='+', default=[item.default])
+            add_option(group, item, nargs='+', default=[item.default])
         else:
-            add_option(parser, item)
+            add_option(group, item)
+
+
+def _makers_with(item: Parameter) -> list[str]:
+    """Return the makers that have a parameter."""
+    return [maker for maker, of in _MAKERS.items() if item in flat_parameters(of)]
 
 
 def run(options: Namespace) -> int:
     """Render the images and add their truth to the truth of the folder."""
-    scenes = _scenes(options)
+    pictures = _pictures(options)
     truth_path = options.folder / 'truth.csv'
     try:
         truth = dict(read_truth(truth_path)) if truth_path.exists() else {}
-        for scene, phase in scenes:
+        for picture in pictures:
             ending.check()
-            rendering = render(scene, phase)
-            name = f'{scene.light}_{scene.ambient:g}_{scene.seed}'
-            name += f'_{phase}.png' if scene.phases > 1 else '.png'
-            write_image(options.folder / name, rendering.image)
-            truth[name] = tuple(map(TrueTarget.of, rendering.targets))
+            rendering = picture.made()
+            write_image(options.folder / picture.name, rendering.image)
+            truth[picture.name] = tuple(map(TrueTarget.of, rendering.targets))
             write_truth(truth_path, truth)
             count = len(rendering.targets)
-            say(f'{options.folder / name}: {count} targets')
+            say(f'{options.folder / picture.name}: {count} targets')
     except ValueError as error:  # of a file, or an impossible scene
         tell('render', error)
         return 1
     return 0
 
 
-def _scenes(options: Namespace) -> Iterator[tuple[SceneSettings, int]]:
-    """Return scenes and phases one by one, having refused options that do not fit each other."""
+def _pictures(options: Namespace) -> Iterator[_Picture]:
+    """Return pictures one by one, having refused options that do not fit each other."""
+    settings: type[SceneSettings | BentSettings] = _MAKERS[options.maker]
+    _refuse_others(options)
     first = [
-        settings_from(Namespace(**vars(options) | {'light': light}), SceneSettings)
+        settings_from(Namespace(**vars(options) | {'light': light}), settings)
         for light in options.light
     ]
     for scene in first:
         replace(scene, seed=scene.seed + options.count - 1)  # refuses a seed that is too large
     return (
-        (replace(scene, seed=scene.seed + number), phase)
+        _Picture(replace(scene, seed=scene.seed + number), phase)
         for scene in first
         for number in range(options.count)
-        for phase in range(scene.phases)
+        for phase in range(scene.phases if isinstance(scene, SceneSettings) else 1)
     )
+
+
+def _refuse_others(options: Namespace) -> None:
+    """Raise a ValueError if an option was given that the maker does not have."""
+    for item in (item for of in _MAKERS.values() for item in flat_parameters(of)):
+        value, makers = getattr(options, item.name), _makers_with(item)
+        if options.maker not in makers and value != item.default:
+            raise ValueError(
+                f'{item.name} is {value!r} and maker is {options.maker!r}; accepted with '
+                f'{item.name} is the maker {makers[0]!r}'
+            )

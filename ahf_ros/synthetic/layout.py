@@ -55,6 +55,17 @@ def finest_grid(width: int, height: int, radius: float) -> tuple[int, int]:
     return int(width / (2 * radius)), int(height / (2 * radius))
 
 
+def fitting_grid(width: int, height: int, radius: float, count: int) -> tuple[int, int]:
+    """Return the columns and rows of the coarsest grid with a cell for each of so many circles.
+
+    A ValueError says so if no grid has.
+    """
+    grids = _grids(finest_grid(width, height, radius), width / height, count)
+    if not grids:
+        raise ValueError(f'{count} circles of {radius:g} px do not fit into {width} x {height} px')
+    return grids[0]
+
+
 def grid_placements(
     camera: Camera, radii: np.ndarray, generator: np.random.Generator
 ) -> Placements:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import warnings
 from dataclasses import dataclass
+from typing import Any
 
 import cv2
 import numpy as np
@@ -160,15 +161,14 @@ class SceneSettings:
         """
         check_parameters(self)
         object.__setattr__(self, 'family', family_in(self.family, self.family_file))
-        half_view = math.hypot(self.width, self.height) / 2 / (self.width * self.focal_length)
-        half_view += 0.02 / self.focal_length  # the principal point is off the middle
+        half_view = _half_view(self.width, self.height, self.focal_length)
         steepest = math.degrees(math.atan(0.95 / half_view))
         if self.tilt > steepest:
             raise ValueError(
                 f'tilt is {self.tilt!r}, accepted is a number from 0 to {steepest:.1f} with a '
                 f'focal_length of {self.focal_length:g}'
             )
-        strongest = 0.13 / half_view**2  # up to 4/27, distortion is invertible in the image
+        strongest = strongest_distortion(self.width, self.height, self.focal_length)
         if self.distortion < -strongest:
             raise ValueError(
                 f'distortion is {self.distortion!r}, accepted is a number of at least '
@@ -202,6 +202,35 @@ class SceneSettings:
         """Radius of what is left free about a target, in radii of its dot."""
         zone = proportions(self.family, self.family_file).quiet_zone
         return zone if self.wall == 1 else zone / _CARD_WIDTH
+
+
+def strongest_distortion(width: int, height: int, focal_length: float) -> float:
+    """Return how negative k1 may be, so that distortion is invertible in the image.
+
+    The size is in px, the focal length in image widths. The limit itself is at 4/27.
+    """
+    return 0.13 / _half_view(width, height, focal_length) ** 2
+
+
+def drawn_numbers(settings: Any, generator: np.random.Generator) -> list[int]:
+    """Return random IDs, as many as `settings.targets` of `settings.family` and `family_file`.
+
+    IDs repeat only if there are more targets than codes.
+    """
+    name, file, count = settings.family, settings.family_file, settings.targets
+    # IDs are drawn from those of gsi in the order of its data file
+    in_file = kind_of(name, file) == 'gsi'
+    every = code_family(name, file).numbers if in_file else numbers_of(name, file)
+    rounds = -(-count // len(every))
+    shuffled = [generator.permutation(every) for _ in range(rounds)]
+    numbers: list[int] = np.concatenate([np.empty(0, int), *shuffled])[:count].tolist()
+    return numbers
+
+
+def _half_view(width: int, height: int, focal_length: float) -> float:
+    """Return the largest length of x and y of a ray (x, y, 1) in the image."""
+    half_view = math.hypot(width, height) / 2 / (width * focal_length)
+    return half_view + 0.02 / focal_length  # the principal point is off the middle
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -313,21 +342,15 @@ def _coded_targets(
     """Return targets with random positions, sizes, codes and directions, and the cards below.
 
     Prints are larger where the wall is farther away, so that every dot is about `dot_radius` in
-    the image. Codes repeat only if there are more targets than codes.
+    the image.
     """
-    name, file = settings.family, settings.family_file
-    # IDs are drawn from those of gsi in the order of its data file
-    in_file = kind_of(name, file) == 'gsi'
-    every = code_family(name, file).numbers if in_file else numbers_of(name, file)
-    count = settings.targets
+    name, file, count = settings.family, settings.family_file, settings.targets
     semi_major = settings.dot_radius * (
         1 + settings.radius_spread * generator.uniform(-1, 1, count)
     )
     semi_major *= np.resize(size_ratios(settings.sizes), count)
     turns = generator.uniform(0, 2 * math.pi, count)
-    rounds = -(-count // len(every))
-    shuffled = [generator.permutation(every) for _ in range(rounds)]
-    ids = np.concatenate([np.empty(0, int), *shuffled])[:count].tolist()
+    ids = drawn_numbers(settings, generator)
     free = settings.free_radius
     reach = quiet_radius(semi_major, float(camera.intrinsics[0, 0]), free)
     placements = grid_placements(camera, reach, generator)

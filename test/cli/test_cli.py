@@ -17,6 +17,7 @@ from ahf_ros.interchange.image_files import read_image, write_image
 from ahf_ros.interchange.truth_files import read_truth
 from ahf_ros.session_settings import IdentificationSettings
 from ahf_ros.settings.nested import flat_parameters
+from ahf_ros.synthetic.bent.settings import BentSettings
 from ahf_ros.synthetic.scene import SceneSettings
 from support.command_line import ahf, status
 
@@ -66,6 +67,18 @@ def test_rendered_images_have_their_truth(folder):
     numbers = {name: len(targets) for name, targets in truth.items()}
     assert numbers == {'normal_0.3_4.png': 6, 'shadow_0.3_4.png': 6}
     assert read_image(folder / 'shadow_0.3_4.png').shape == (480, 640)
+
+
+def test_bent_sheets_are_rendered_and_identified(tmp_path, capsys):
+    folder = tmp_path / 'bent'
+    scene = (*SCENE, '--maker', 'bent', '--sheets', 2, '--motion', 0.5, '--distortion', -0.1)
+    assert status('render', folder, *scene, '--light', 'normal', '--seed', 5) == 0
+    assert len(read_truth(folder / 'truth.csv')['normal_0.3_5.png']) == 6
+    assert status('identify', folder / 'normal_0.3_5.png', '--json') == 0
+    (tmp_path / 'results.jsonl').write_text(capsys.readouterr().out)
+    table = ahf('evaluate', folder / 'truth.csv', tmp_path / 'results.jsonl')
+    row = table.stderr.splitlines()[-1]
+    assert row.split()[1:5] == ['6'] * 4, table  # expected, reported, found, right
 
 
 def test_a_series_grows_and_keeps_what_was_there(tmp_path):
@@ -281,6 +294,10 @@ def test_bad_options_are_named(capsys, arguments, message):
         ('--light dark', "light is 'dark', accepted is one of normal, "),
         ('--count 0', "count is '0', accepted is an integer of at least 1"),
         ('--targets 100000', 'targets is 100000, accepted is an integer from 0 to'),
+        ('--maker film', "maker is 'film', accepted is one of wall, bent"),
+        ('--motion 2', "motion is 2.0 and maker is 'wall'; accepted with motion is the maker"),
+        ('--maker bent --phases 4', "phases is 4 and maker is 'bent'; accepted with phases is"),
+        ('--maker bent --bend-radius 10', 'bend_radius is 10.0, accepted is a number of at le'),
     ],
 )
 def test_bad_scenes_are_named(tmp_path, capsys, arguments, message):
@@ -298,9 +315,16 @@ def test_files_that_cannot_be_compared_are_named(tmp_path, capsys, missing):
     assert f'{missing} cannot be read: No such file' in capsys.readouterr().err
 
 
-@pytest.mark.parametrize('command', ['identify', 'bag', 'render'])
-def test_help_describes_every_setting(monkeypatch, capsys, command):
-    settings = SceneSettings if command == 'render' else IdentificationSettings
+@pytest.mark.parametrize(
+    ('command', 'settings'),
+    [
+        ('identify', IdentificationSettings),
+        ('bag', IdentificationSettings),
+        ('render', SceneSettings),
+        ('render', BentSettings),
+    ],
+)
+def test_help_describes_every_setting(monkeypatch, capsys, command, settings):
     monkeypatch.setenv('COLUMNS', '1000')
     assert status(command, '--help') == 0
     words = capsys.readouterr().out

@@ -1,0 +1,190 @@
+"""Bent sheets, photographed by the second maker: targets, their centres and what they cost.
+
+Every picture has targets on six sheets that are bent to radii of 100 to 500 mm. Motion blur,
+defocus, gloss, roughness, grain, distortion and vignetting are drawn for each seed, so that all
+pictures of a seed have them in common; every second seed has bright targets. Each row is a light,
+with its ambient light, at one radius of dots. It has the targets with the right ID, wrong IDs and
+false positives; the NEES of the centres, 2 on average where covariances are right; the share of
+centres that are more than 4 standard deviations off, 0.03 % where errors are normal; the largest
+error; and the function calls of an image. Seeds from 101 on are for tests.
+
+    python -m benchmarks.bent [--detector ring] [--family metashape12] [--sizes 10 6]
+        [--lights 'stripe 0.12' ...] [--seeds 401 402] [--output FILE]
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from ahf_ros.codes.families import FAMILY_NAMES
+from ahf_ros.detectors import DETECTOR_NAMES
+from ahf_ros.evaluation import total
+from ahf_ros.synthetic.bent.picture import render_bent
+from ahf_ros.synthetic.bent.settings import BentSettings
+from benchmarks import report
+from benchmarks.limits import DOT_SHARES
+from benchmarks.report import number
+from benchmarks.rows import Case, Scene, Seen, detector, measured
+from support.calls import calls_of
+
+_PATTERNS = ('stripe', 'fine_stripe', 'lattice', 'dense_lattice')
+LIGHTS = ('normal 0.3', *(f'{name} {ambient}' for ambient in (0.3, 0.12) for name in _PATTERNS))
+"""Patterns and their ambient light."""
+
+WIDTH, HEIGHT = 1920, 1280
+"""Of the pictures, px."""
+
+TARGETS = 54
+"""In a picture."""
+
+FAR = 4.0
+"""Standard deviations beyond which a centre is counted."""
+
+_RANGES: dict[str, tuple[float, float]] = {
+    'motion': (0.5, 2.0),
+    'confusion': (0.2, 1.0),
+    'gloss': (0.02, 0.06),
+    'roughness': (0.2, 0.6),
+    'grain': (0.0, 0.1),
+    'ragged': (0.0, 0.04),
+    'texture': (0.01, 0.04),
+    'distortion': (-0.2, 0.1),
+    'tangential_1': (-0.005, 0.005),
+    'tangential_2': (-0.005, 0.005),
+    'vignetting': (0.1, 0.6),
+    'black': (0.03, 0.1),
+    'exposure': (150.0, 230.0),
+    'full_well': (4000.0, 15000.0),
+}
+"""What is drawn for each seed."""
+
+
+def settings(family: str, light: str, radius: float, seed: int, targets: int) -> BentSettings:
+    """Return the picture of a light of `LIGHTS`, a radius of dots in px and a seed."""
+    generator = np.random.default_rng(seed)
+    drawn = {name: float(generator.uniform(*of)) for name, of in _RANGES.items()}
+    pattern, ambient = light.split()
+    share = DOT_SHARES.get(family, 1.0)
+    return BentSettings(
+        width=WIDTH,
+        height=HEIGHT,
+        targets=targets,
+        family=family,
+        polarity='bright' if seed % 2 == 0 else 'dark',
+        dot_radius=radius * share,
+        printed_radius=BentSettings().printed_radius * share,
+        light=pattern,
+        ambient=float(ambient),
+        seed=seed,
+        **drawn,
+    )
+
+
+def case(family: str, light: str, radius: float, targets: int = TARGETS) -> Case:
+    """Return a row of the table."""
+
+    def make(seed: int) -> Scene:
+        rendering = render_bent(settings(family, light, radius, seed, targets))
+        return rendering.image, rendering.targets
+
+    return Case(f'{radius:g} px', light, make, family)
+
+
+def records(
+    cases: Sequence[Case], seeds: Sequence[int], detector_name: str
+) -> list[dict[str, Any]]:
+    """Return the figures of rows."""
+    run = detector(detector_name)
+    calls: list[int] = []
+
+    def counted(image: np.ndarray, family: str, expected: int) -> Seen:
+        seen: list[Seen] = []
+        calls.append(calls_of(lambda: seen.append(run(image, family, expected))))
+        return seen[0]
+
+    made = []
+    for by in measured(cases, seeds, {'': counted}):
+        row = by['']
+        squares = np.array(row.squares)
+        errors = [np.hypot(*error) for error in total(row.scores).errors]
+        record = row.record() | {
+            'far': int((squares > FAR**2).sum()),
+            'measured': len(squares),
+            'largest_error': float(max(errors, default=0)),
+            'calls': round(sum(calls) / len(calls)),
+        }
+        del record['seconds'], record['times_contours']  # those of counted calls
+        calls.clear()
+        made.append(record)
+    return made
+
+
+def markdown(figures: report.Report) -> str:
+    """Return the report as a table."""
+    rows = []
+    for of in figures['rows']:
+        far = of['far'] / of['measured'] if of['measured'] else None
+        rows.append(
+            (
+                of['group'],
+                of['name'],
+                of['expected'],
+                of['right'],
+                of['wrong'],
+                of['false_positives'],
+                number(of['rmse_xy'], 3),
+                number(of['largest_error'], 2),
+                number(of['nees'], 1),
+                number(far and 100 * far, 1),
+                f'{of["calls"]:,}',
+            )
+        )
+    right, expected, wrong, false = (
+        sum(of[key] for of in figures['rows'])
+        for key in ('right', 'expected', 'wrong', 'false_positives')
+    )
+    head = ('radius', 'light', 'N', 'right', 'wrong', 'false')
+    head += ('RMSE XY px', 'largest px', 'NEES', f'beyond {FAR:g} sigma %', 'calls')
+    return '\n'.join(
+        [
+            f'{figures["method"]}, family {figures["family"]}. ' + report.about_text(figures),
+            '',
+            *report.table(head, rows),
+            '',
+            f'{right} of {expected} right, {wrong} wrong, {false} false.',
+        ]
+    )
+
+
+def parser() -> argparse.ArgumentParser:
+    """Return what can be chosen."""
+    made = report.parser(__doc__)
+    made.add_argument('--detector', choices=DETECTOR_NAMES, default='ring')
+    made.add_argument('--family', choices=FAMILY_NAMES, default='metashape12')
+    made.add_argument('--sizes', nargs='+', type=float, default=[10.0, 6.0], help='px')
+    made.add_argument('--lights', nargs='+', choices=LIGHTS, default=LIGHTS)
+    made.add_argument('--targets', type=int, default=TARGETS)
+    return made
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Measure and print."""
+    options = report.parsed(parser(), arguments)
+    figures = report.about(options.seeds, method=options.detector, family=options.family)
+    cases = [
+        case(options.family, light, radius, options.targets)
+        for radius in options.sizes
+        for light in options.lights
+    ]
+    figures['rows'] = records(cases, options.seeds, options.detector)
+    report.publish(figures, markdown(figures), options)
+    return 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())
