@@ -2,14 +2,14 @@
 
 Every picture has targets on six sheets that are bent to radii of 100 to 500 mm. Motion blur,
 defocus, gloss, roughness, grain, distortion and vignetting are drawn for each seed, so that all
-pictures of a seed have them in common; every second seed has bright targets. Each row is a light,
-with its ambient light, at one radius of dots. It has the targets with the right ID, wrong IDs and
+pictures of a seed have them in common. Each row is a light, with its ambient light, at one radius
+of dots, for dark targets or for bright ones, which are on black discs as they are printed. It has the targets with the right ID, wrong IDs and
 false positives; the NEES of the centres, 2 on average where covariances are right; the share of
 centres that are more than 4 standard deviations off, 0.03 % where errors are normal; the largest
 error; and the function calls of an image. Seeds from 101 on are for tests.
 
     python -m benchmarks.bent [--detector ring] [--family metashape12] [--sizes 10 6]
-        [--lights 'stripe 0.12' ...] [--seeds 401 402] [--output FILE]
+        [--polarities dark bright] [--lights 'stripe 0.12' ...] [--seeds 401 402] [--output FILE]
 """
 
 from __future__ import annotations
@@ -64,8 +64,14 @@ _RANGES: dict[str, tuple[float, float]] = {
 """What is drawn for each seed."""
 
 
-def settings(family: str, light: str, radius: float, seed: int, targets: int) -> BentSettings:
-    """Return the picture of a light of `LIGHTS`, a radius of dots in px and a seed."""
+POLARITIES = ('dark', 'bright')
+"""Of targets."""
+
+
+def settings(
+    family: str, polarity: str, light: str, radius: float, seed: int, targets: int
+) -> BentSettings:
+    """Return the picture of a polarity, a light of `LIGHTS`, a radius in px and a seed."""
     generator = np.random.default_rng(seed)
     drawn = {name: float(generator.uniform(*of)) for name, of in _RANGES.items()}
     pattern, ambient = light.split()
@@ -75,7 +81,7 @@ def settings(family: str, light: str, radius: float, seed: int, targets: int) ->
         height=HEIGHT,
         targets=targets,
         family=family,
-        polarity='bright' if seed % 2 == 0 else 'dark',
+        polarity=polarity,
         dot_radius=radius * share,
         printed_radius=BentSettings().printed_radius * share,
         light=pattern,
@@ -85,14 +91,14 @@ def settings(family: str, light: str, radius: float, seed: int, targets: int) ->
     )
 
 
-def case(family: str, light: str, radius: float, targets: int = TARGETS) -> Case:
+def case(family: str, polarity: str, light: str, radius: float, targets: int = TARGETS) -> Case:
     """Return a row of the table."""
 
     def make(seed: int) -> Scene:
-        rendering = render_bent(settings(family, light, radius, seed, targets))
+        rendering = render_bent(settings(family, polarity, light, radius, seed, targets))
         return rendering.image, rendering.targets
 
-    return Case(f'{radius:g} px', light, make, family)
+    return Case(f'{radius:g} px, {polarity}', light, make, family)
 
 
 def records(
@@ -148,7 +154,7 @@ def markdown(figures: report.Report) -> str:
         sum(of[key] for of in figures['rows'])
         for key in ('right', 'expected', 'wrong', 'false_positives')
     )
-    head = ('radius', 'light', 'N', 'right', 'wrong', 'false')
+    head = ('targets', 'light', 'N', 'right', 'wrong', 'false')
     head += ('RMSE XY px', 'largest px', 'NEES', f'beyond {FAR:g} sigma %', 'calls')
     return '\n'.join(
         [
@@ -167,6 +173,7 @@ def parser() -> argparse.ArgumentParser:
     made.add_argument('--detector', choices=DETECTOR_NAMES, default='ring')
     made.add_argument('--family', choices=FAMILY_NAMES, default='metashape12')
     made.add_argument('--sizes', nargs='+', type=float, default=[10.0, 6.0], help='px')
+    made.add_argument('--polarities', nargs='+', choices=POLARITIES, default=POLARITIES)
     made.add_argument('--lights', nargs='+', choices=LIGHTS, default=LIGHTS)
     made.add_argument('--targets', type=int, default=TARGETS)
     return made
@@ -177,7 +184,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = report.parsed(parser(), arguments)
     figures = report.about(options.seeds, method=options.detector, family=options.family)
     cases = [
-        case(options.family, light, radius, options.targets)
+        case(options.family, polarity, light, radius, options.targets)
+        for polarity in options.polarities
         for radius in options.sizes
         for light in options.lights
     ]
