@@ -3,10 +3,11 @@
 Every picture has targets on six sheets that are bent to radii of 100 to 500 mm. Motion blur,
 defocus, gloss, roughness, grain, distortion and vignetting are drawn for each seed, so that all
 pictures of a seed have them in common. Each row is a light, with its ambient light, at one radius
-of dots, for dark targets or for bright ones, which are on black discs as they are printed. It has the targets with the right ID, wrong IDs and
-false positives; the NEES of the centres, 2 on average where covariances are right; the share of
-centres that are more than 4 standard deviations off, 0.03 % where errors are normal; the largest
-error; and the function calls of an image. Seeds from 101 on are for tests.
+of dots, for dark targets or for bright ones, which are on black discs as they are printed. It has
+the targets with the right ID, wrong IDs and false positives; the NEES of the centres, 2 on average
+where covariances are right; the share of centres that are more than 4 standard deviations off,
+0.03 % where errors are normal; the largest error; and the function calls of an image.
+Seeds from 101 on are for tests.
 
     python -m benchmarks.bent [--detector ring] [--family metashape12] [--sizes 10 6]
         [--polarities dark bright] [--lights 'stripe 0.12' ...] [--seeds 401 402] [--output FILE]
