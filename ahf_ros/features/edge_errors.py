@@ -26,7 +26,6 @@ _MINIMUM_RATIO_ERROR = 0.01  # that counts as usual
 _RESIDUAL_DOUBT = 0.4  # times the usual residual, on top of it, that halves the weight
 _MINIMUM_RESIDUAL = 0.3  # that counts as usual, gray values
 _MINIMUM_BRIGHT = 1.0  # gray value that ratios are taken to
-_UNEVEN = 0.011  # usual error of slopes where light is no slope within a profile, 1/px
 _MINIMUM_USUAL = 0.002  # of the errors of slopes, 1/px
 _OUTLIER = 3.0  # times the usual error of a slope that halves its weight
 _SHARING = 10  # of an edge that may share pixels with it, to either side
@@ -75,14 +74,13 @@ class LightSlope:
 
 
 def unevenness(errors: np.ndarray, weights: np.ndarray) -> np.ndarray:
-    """Return how much the slopes of k outlines differ from their neighbours, 0 to 1, shape (k,).
+    """Return how much the slopes of k outlines differ from their neighbours, 1/px, shape (k,).
 
     Where slopes differ from profile to profile, light is no slope within a profile, either. The
     errors of single slopes are 1/px, shape (k, n) as their weights.
     """
     squares = (weights * errors**2).sum(axis=1) / np.maximum(weights.sum(axis=1), NO_WEIGHT)
-    uneven: np.ndarray = np.minimum(squares / _UNEVEN**2, 1)
-    return uneven
+    return np.sqrt(squares)
 
 
 def common_slope(slopes: np.ndarray, polarity: np.ndarray, weights: np.ndarray) -> np.ndarray:
