@@ -53,6 +53,7 @@ _UNEVEN = 0.011  # usual error of slopes where light is no slope within a profil
 # uneven it seems in even light, 1/px. They are those of 4038 centres in scenes of both makers, of
 # the seeds 1 to 3, by maximum likelihood.
 _OF_LIGHT, _EVEN = 78.0, 0.0085
+_LONG = 6.0  # radius of dots, px, from which profiles are long enough for slopes to tell of light
 _SYSTEMATIC = 0.001  # standard deviation of what pixels and interpolation do to a centre, px
 _PRIOR_SCALE = 0.003  # standard deviation of the printed proportions of circles and dot
 _PRIOR_PERSPECTIVE = 0.02  # of the projective part, in 1 a dot radius
@@ -188,7 +189,7 @@ def fit_circles(
     squares = np.where(placed, errors * edges.scale, 0) ** 2
     covariance = np.full((len(frames), 2, 2), np.nan)
     if covariances:
-        covariance = _covariance(solution, edges, circles, projective)
+        covariance = _covariance(solution, edges, frames, circles, projective)
     affine = frame.local_affine(moved)
     return Fit(
         frames=moved,
@@ -243,7 +244,9 @@ def _solve(edges: Edges, circles: Circles, window: np.ndarray, projective: bool)
     return _Solution(own, light, model, changes, normal, weights, errors, relative, robust)
 
 
-def _covariance(of: _Solution, edges: Edges, circles: Circles, projective: bool) -> np.ndarray:
+def _covariance(
+    of: _Solution, edges: Edges, frames: np.ndarray, circles: Circles, projective: bool
+) -> np.ndarray:
     """Return the covariances of the centres, shape (k, 2, 2), squared dot radii."""
     # What an error changes is not its weight times the error, but the derivative of that.
     gain = geman_mcclure_gain(of.weights, of.relative).sum(axis=1)
@@ -257,7 +260,8 @@ def _covariance(of: _Solution, edges: Edges, circles: Circles, projective: bool)
     if projective:
         dot = circles.group == 0
         uneven = unevenness(of.light.errors[:, dot], used[:, dot])
-        variance = _OF_LIGHT * (uneven + _EVEN)
+        short = np.minimum(frame.mean_radii(frames) / _LONG, 1) ** 2
+        variance = _OF_LIGHT * (uneven + _EVEN) * short
     else:
         variance = 1 + np.minimum((unevenness(of.light.errors, used) / _UNEVEN) ** 2, 1)
     covariance *= variance[:, None, None]
