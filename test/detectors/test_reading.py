@@ -12,7 +12,7 @@ import pytest
 from ahf_ros.codes.ring import FAMILY_NAMES, canonical, family, ring_family
 from ahf_ros.detectors.ring.hypotheses import Hypotheses
 from ahf_ros.detectors.ring.polar import polar_images
-from ahf_ros.detectors.ring.reading import best_growth, read_bands
+from ahf_ros.detectors.ring.reading import _by_dot, best_growth, read_bands
 from ahf_ros.features.circle_fit import Fit
 from ahf_ros.synthetic.scene import Rendering, SceneSettings
 from support.ring import lone_dot, measured
@@ -138,3 +138,12 @@ def test_a_dot_on_bare_paper_leaves_nothing_to_read() -> None:
     found = read_bands(gray, measured(gray, [150.0], [100.0], 12.0), CODE)
     assert found.words.tolist() == [0]
     assert not found.certain.any()
+
+
+def test_a_dot_alone_without_a_covariance_has_that_of_the_joint_fit() -> None:
+    y, x = np.mgrid[:61, :61].astype(np.float32)
+    gray = np.where(np.hypot(x - 30, y - 30) < 8, 45.0, 180.0).astype(np.float32)
+    joint = measured(gray, [30.0], [30.0], 8.0)
+    unknown = replace(joint, covariance=np.full((1, 2, 2), np.nan))
+    alone = _by_dot(joint, unknown, np.zeros(1), np.array([0]))
+    assert np.array_equal(alone.covariance, joint.covariance)

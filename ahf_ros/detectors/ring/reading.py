@@ -210,7 +210,14 @@ def _thin(printed: Fit, growth: np.ndarray, family: Family) -> np.ndarray:
 def _by_dot(fit: Fit, printed: Fit, growth: np.ndarray, which: np.ndarray) -> Fit:
     """Return joint fits, some of them with the frames of printed dots alone, and their growth."""
     shift = printed.polarity * growth * printed.size
-    alone = replace(printed, edge_shift=shift, share=fit.share, deviation=fit.deviation)
+    known = np.isfinite(printed.covariance)
+    alone = replace(
+        printed,
+        edge_shift=shift,
+        share=fit.share,
+        deviation=fit.deviation,
+        covariance=np.where(known, printed.covariance, fit.covariance),
+    )
     return fit.replaced(which, alone.select(which))
 
 
