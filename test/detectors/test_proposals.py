@@ -13,7 +13,7 @@ from ahf_ros.detectors.ring import detector, proposals
 from ahf_ros.detectors.ring.detector import find_hypotheses, report
 from ahf_ros.detectors.ring.families import read_families
 from ahf_ros.detectors.ring.hypotheses import Hypotheses
-from ahf_ros.detectors.ring.proposals import ALIKE, HOPEFUL, hopes, measure_alike, with_rims
+from ahf_ros.detectors.ring.proposals import HOPEFUL, hopes, measure_alike, with_rims
 from ahf_ros.features import frame
 from ahf_ros.features.circle_fit import Fit
 from ahf_ros.features.dots import Dots
@@ -98,7 +98,7 @@ def test_a_dot_in_the_shape_of_others_is_where_its_edges_or_its_own_shape_put_it
     aside = replace(right, frames=frame.translated(right.frames, 3.0, 0.0))
     for dots in (right, aside):
         alike = measure_alike(gray, dots, FAMILIES)
-        assert (hopes(gray, alike, FAMILIES) > ALIKE).all()
+        assert (hopes(gray, alike, FAMILIES) > HOPEFUL).all()
         centres = sorted(alike.frames[:, :2, 2].tolist())
         assert np.allclose(centres, sorted(zip(x, y, strict=True)), atol=0.2)
     assert not len(measure_alike(gray, right.select(slice(0)), FAMILIES).frames)
