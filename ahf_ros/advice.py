@@ -36,8 +36,8 @@ from ahf_ros.doubt import repeated_remark
 from ahf_ros.edge_shift import edge_shift_remark, median_edge_shift
 from ahf_ros.features.dot_search import whole_dots
 from ahf_ros.features.pyramid import MAXIMUM_RADIUS, image_pyramid
-from ahf_ros.filtering.settling import evident, still_shown
 from ahf_ros.imaging.image import as_gray, check_image
+from ahf_ros.settling import evident, still_shown
 from ahf_ros.target import UNDECODED, Target, repeated_targets
 from ahf_ros.text import counted
 

@@ -23,11 +23,11 @@ from ahf_ros.detectors import (
     estimator,
 )
 from ahf_ros.filtering.identifier import Identifier
-from ahf_ros.filtering.settling import SettlingIdentifier
 from ahf_ros.filtering.trials import DetectorFunction
 from ahf_ros.imaging.stack import ImageStack
 from ahf_ros.session_settings import IdentificationSettings
 from ahf_ros.settings.nested import updated
+from ahf_ros.settling import SettlingIdentifier
 from ahf_ros.target import Identification
 from ahf_ros.text import shown
 

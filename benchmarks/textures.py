@@ -20,7 +20,7 @@ import cv2
 import numpy as np
 
 from ahf_ros.detectors import create_detector
-from ahf_ros.filtering.settling import evident
+from ahf_ros.settling import evident
 from ahf_ros.target import Target
 from benchmarks import report
 

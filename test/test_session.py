@@ -16,6 +16,7 @@ from ahf_ros.settings.nested import flat_parameters, flat_values, updated
 from ahf_ros.synthetic.scene import SceneSettings
 from ahf_ros.target import Target
 from support.scenes import rendered
+from support.square_markers import needs_square_markers
 
 IMAGE = np.arange(400, dtype=np.uint8).reshape(20, 20)
 
@@ -128,7 +129,7 @@ def test_only_targets_of_the_detector_are_counted() -> None:
     'values',
     [
         {'family': 'metashape12'},
-        {'family': 'apriltag_36h11'},
+        pytest.param({'family': 'apriltag_36h11'}, marks=needs_square_markers),
         {'family': 'gsi', 'dot_radius': 5},
     ],
 )

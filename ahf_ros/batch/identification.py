@@ -19,13 +19,13 @@ from ahf_ros.detectors import Detector, DetectorSettings, create_detector
 from ahf_ros.doubt import doubt, repeated_remark
 from ahf_ros.drawing.overlay import draw, summary
 from ahf_ros.edge_shift import edge_shift_remark
-from ahf_ros.filtering.settling import memory_of
 from ahf_ros.imaging.image import check_image, white_remark
 from ahf_ros.interchange.files import is_url, read_bytes, url_fingerprint
 from ahf_ros.interchange.image_files import read_noted_image, write_image
 from ahf_ros.interchange.target_json import to_json
 from ahf_ros.session import create_identifier
 from ahf_ros.session_settings import IdentificationSettings
+from ahf_ros.settling import memory_of
 from ahf_ros.stream import identify_parts, refusal
 from ahf_ros.target import UNDECODED, Identification, Target, UndecodedTarget
 

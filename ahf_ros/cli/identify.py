@@ -114,8 +114,8 @@ def _run(options: argparse.Namespace, output: TextIO | None) -> int:
     from ahf_ros.batch.results import Unwritable
     from ahf_ros.batch.settling import settled_tasks
     from ahf_ros.detectors import is_foreign
-    from ahf_ros.filtering.settling import families_line
     from ahf_ros.interchange.export.survey import measured_image
+    from ahf_ros.settling import families_line
 
     failed = bool(problems)
     results = identified = 0

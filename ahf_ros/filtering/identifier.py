@@ -72,7 +72,7 @@ class Memory:
     families : tuple of str
         The families that were found so far; empty unless they are to be settled.
     shown : int
-        How many images have settled them, see `ahf_ros.filtering.settling`.
+        How many images have settled them, see `ahf_ros.settling`.
     glanced : int
         In how many parts of images other families have been looked for since; -1 where the next
         image is looked at as a whole.

@@ -25,7 +25,6 @@ from sensor_msgs.msg import CompressedImage, Image
 from std_msgs.msg import Header
 
 from ahf_ros.detectors.contract import Unavailable
-from ahf_ros.filtering.settling import settled_families
 from ahf_ros.interchange.image_messages import nanoseconds
 from ahf_ros.msg import CodedTargetArray
 from ahf_ros.nodes.answers import Answers
@@ -33,6 +32,7 @@ from ahf_ros.nodes.diagnostics import Tally, seconds
 from ahf_ros.nodes.pipeline import Pipeline, Stopping
 from ahf_ros.nodes.process import LOG_PERIOD, ProcessNode
 from ahf_ros.nodes.settings import LOSSLESS
+from ahf_ros.settling import settled_families
 from ahf_ros.stream import Answer, Kind, Remark, message_frame, why_refused
 from ahf_ros.text import printable
 

@@ -10,8 +10,8 @@ from ahf_ros.codes import SQUARE_NAMES
 from ahf_ros.codes.square import marker, words
 from ahf_ros.detectors import Detector, create_detector
 from ahf_ros.evaluation import score
-from ahf_ros.filtering.settling import evident
 from ahf_ros.session import identify
+from ahf_ros.settling import evident
 from ahf_ros.synthetic.scene import Rendering
 from ahf_ros.target import Target
 from benchmarks.squares import readers

@@ -19,6 +19,7 @@ from ahf_ros.synthetic.bent.picture import BentRendering, render_bent
 from ahf_ros.synthetic.bent.settings import BentSettings
 from ahf_ros.synthetic.bent.sheet import Sheet
 from ahf_ros.synthetic.covers import design
+from support.square_markers import needs_square_markers
 
 SMALL = BentSettings(width=520, height=350, targets=6, sheets=6, dot_radius=8.0)
 PLAIN = replace(
@@ -141,7 +142,15 @@ def test_distortion_is_that_of_opencv() -> None:
     assert np.abs(y - points[:, 1] / points[:, 2]).max() < 1e-10
 
 
-@pytest.mark.parametrize('name', FAMILY_NAMES)
+@pytest.mark.parametrize(
+    'name',
+    [
+        pytest.param(it, marks=needs_square_markers)
+        if it.startswith(('aruco', 'apriltag'))
+        else it
+        for it in FAMILY_NAMES
+    ],
+)
 def test_outlines_hold_the_ink_that_the_other_maker_draws(name: str) -> None:
     number = list(numbers_of(name))[2]
     hole = 0.1 if name.startswith(('metashape', 'aicon', 'cct1', 'dots')) else 0.0

@@ -51,6 +51,7 @@ _GLARE_EDGES = 0.03  # share of the ground, more than edges of glare have
 _WHITE_OUT = 0.6  # share of the ground that is saturated, from which that is no glare
 _SOFT, _ASIDE = 1.6, 0.15  # distance from an edge at which it ends, blurs and dot radii
 _STRAY = 0.03  # share of readings that are bright in a gap that is dark
+_WHITE = 0.7  # share of the step of ink, in ln, from which what ends the ground is white
 _FRAMED = 0.5  # share of directions, from which the ground ends in what is as bright as ink
 _NO_GLARE = 256.0  # more than any gray value
 
@@ -303,14 +304,16 @@ def _reach(
     return reach
 
 
-def on_dark_ground(polar: PolarImages, band: tuple[float, float]) -> PolarImages:
-    """Return polar images in which bright targets reach as far as the dark ground about them.
+def on_dark_ground(
+    polar: PolarImages, band: tuple[float, float], which: np.ndarray | bool = True
+) -> PolarImages:
+    """Return polar images in which some bright targets reach as far as the dark ground about them.
 
     Where the gap is dark all around and most directions are as bright as ink beyond the band, the
     ground ends there: it was a square that is little larger than the band, on white paper.
     """
     inner, outer = band
-    bright = np.flatnonzero(polar.polarity < 0)
+    bright = np.flatnonzero((polar.polarity < 0) & which)
     if not bright.size:
         return polar
     some = polar.select(bright)
@@ -319,7 +322,8 @@ def on_dark_ground(polar: PolarImages, band: tuple[float, float]) -> PolarImages
     limit = medians(gap) / np.sqrt(some.contrast)
     farthest = some.gray[some.row, :, -1]
     framed = (gap < limit[:, None]).mean(axis=1) > 1 - _STRAY
-    framed &= (farthest >= limit[:, None]).mean(axis=1) > _FRAMED
+    as_ink = medians(gap) / some.contrast**_WHITE
+    framed &= (farthest >= as_ink[:, None]).mean(axis=1) > _FRAMED
     if not framed.any():
         return polar
     bright, some, limit = bright[framed], some.select(framed), limit[framed, None, None]

@@ -49,6 +49,7 @@ from ahf_ros.imaging.black import lifted
 PER_SECTOR = 10
 """Angles of a sector at which bands are read."""
 
+_IN_PLACE = 0.75  # share of the edges of a target whose ground may end
 _THIN = 1.5  # width of a band, in deviations of blur, up to which its dot alone is measured
 _SHIFTS = np.arange(-2.4, 2.41, 0.4)  # of edges, that are tried, px
 
@@ -104,7 +105,7 @@ def _read_part(
     fit = _by_dot(fit, printed, growth, _thin(printed, growth, family))
     growth = fit.polarity * fit.edge_shift / fit.size
     whole = polar_images(gray, fit, family.band, family.bits * PER_SECTOR)
-    polar = on_dark_ground(whole, family.band)
+    polar = on_dark_ground(whole, family.band, fit.share > _IN_PLACE)
     edges = edge_evidence(polar, np.ones(len(read)), growth, family.band, SHARES)
     words = decode(edges, _overhang(growth, family), family, prior.expected)
     # What is seen against anything is that of edges alone, whatever else there is.

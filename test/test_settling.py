@@ -16,13 +16,14 @@ import pytest
 
 from ahf_ros.detectors import create_detector
 from ahf_ros.detectors.explained import without_targets
-from ahf_ros.filtering.settling import FIRST, evident, evident_together
 from ahf_ros.interchange.image_files import write_image
 from ahf_ros.session import create_identifier, identify
+from ahf_ros.settling import FIRST, evident, evident_together
 from ahf_ros.synthetic.scene import SceneSettings, render
 from ahf_ros.target import Target
 from support.calls import calls_of
 from support.command_line import status
+from support.square_markers import needs_square_markers
 
 SOFT = (1, 2, 4, 6)
 """Seeds of photographs whose one target is read, but is not certain."""
@@ -134,8 +135,8 @@ def test_a_clear_image_settles_its_family_at_once_and_later_ones_cost_less(
 @pytest.mark.parametrize(
     ('first', 'second'),
     [
-        ('metashape12', 'apriltag_36h11'),
-        ('aruco_4x4_50', 'cct12'),
+        pytest.param('metashape12', 'apriltag_36h11', marks=needs_square_markers),
+        pytest.param('aruco_4x4_50', 'cct12', marks=needs_square_markers),
         ('metashape12', 'aicon14'),
         ('metashape12', 'gsi'),
         ('cct10', 'cctag3'),
@@ -173,6 +174,7 @@ def test_small_images_are_looked_at_now_and_then() -> None:
     assert sum(of < 1.1 * usual for of in calls) == 7
 
 
+@needs_square_markers
 def test_a_second_family_in_any_image_of_a_batch_is_found(
     tmp_path: Path, capsys: pytest.CaptureFixture
 ) -> None:
@@ -187,7 +189,15 @@ def test_a_second_family_in_any_image_of_a_batch_is_found(
 
 
 @pytest.mark.parametrize('light', ['normal', 'stripe'])
-@pytest.mark.parametrize('family', ['metashape12', 'apriltag_36h11', 'dots', 'cctag3'])
+@pytest.mark.parametrize(
+    'family',
+    [
+        'metashape12',
+        pytest.param('apriltag_36h11', marks=needs_square_markers),
+        'dots',
+        'cctag3',
+    ],
+)
 def test_nothing_is_left_of_targets_that_are_painted_over(family: str, light: str) -> None:
     size = 24 if family == 'cctag3' else 12
     scene = render(replace(WALL, family=family, light=light, targets=6, dot_radius=size))
