@@ -7,7 +7,7 @@ centre of the target. The corner or edge where the reading of a word begins lies
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -60,6 +60,17 @@ class Proportions:
     radii: dict[str, float]
     pinhole: float = 0.0
     polarity: str = 'dark'
+
+    def chosen(self, polarity: str, pinhole: float) -> Proportions:
+        """Return those of a print whose colour and hole are chosen.
+
+        They are the family's where the colour is 'auto' and the hole negative.
+        """
+        return replace(
+            self,
+            polarity=self.polarity if polarity == 'auto' else polarity,
+            pinhole=self.pinhole if pinhole < 0 else pinhole,
+        )
 
 
 @dataclass(frozen=True, slots=True)

@@ -125,17 +125,17 @@ class SheetSettings:
     @property
     def proportions(self) -> Proportions:
         """What all targets have in common, in radii of the dot."""
-        return proportions(self.family, self.family_file)
+        return proportions(self.family, self.family_file).chosen(self.polarity, self.pinhole)
 
     @property
     def colour(self) -> str:
         """Colour of the ink, 'dark' or 'bright'."""
-        return self.proportions.polarity if self.polarity == 'auto' else self.polarity
+        return self.proportions.polarity
 
     @property
     def hole(self) -> float:
         """Radius of the hole in the dot, in radii of the dot, 0 for none."""
-        return self.proportions.pinhole if self.pinhole < 0 else self.pinhole
+        return self.proportions.pinhole
 
     @property
     def on_labels(self) -> bool:

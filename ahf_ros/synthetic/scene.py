@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 
 from ahf_ros.blas import one_blas_thread
-from ahf_ros.codes.designs import proportions
+from ahf_ros.codes.designs import Proportions, proportions
 from ahf_ros.codes.families import ONE, code_family, family_in, kind_of, numbers_of
 from ahf_ros.settings.parameter import check_parameters, parameter
 from ahf_ros.synthetic.camera import Camera, Sensor, tilted_camera
@@ -168,12 +168,7 @@ class SceneSettings:
                 f'tilt is {self.tilt!r}, accepted is a number from 0 to {steepest:.1f} with a '
                 f'focal_length of {self.focal_length:g}'
             )
-        strongest = strongest_distortion(self.width, self.height, self.focal_length)
-        if self.distortion < -strongest:
-            raise ValueError(
-                f'distortion is {self.distortion!r}, accepted is a number of at least '
-                f'{-strongest:.3f} with a focal_length of {self.focal_length:g}'
-            )
+        check_distortion(self)
         ratios = size_ratios(self.sizes)
         smallest = self.dot_radius * (1 - self.radius_spread) * min(ratios)
         most = _MAXIMUM_SHIFT * smallest
@@ -192,24 +187,34 @@ class SceneSettings:
             )
 
     @property
+    def proportions(self) -> Proportions:
+        """What all targets have in common, in radii of the dot."""
+        return proportions(self.family, self.family_file).chosen(self.polarity, self.pinhole)
+
+    @property
     def dark(self) -> bool:
         """Whether targets are dark on white."""
-        printed = proportions(self.family, self.family_file).polarity
-        return (printed if self.polarity == 'auto' else self.polarity) == 'dark'
+        return self.proportions.polarity == 'dark'
 
     @property
     def free_radius(self) -> float:
         """Radius of what is left free about a target, in radii of its dot."""
-        zone = proportions(self.family, self.family_file).quiet_zone
+        zone = self.proportions.quiet_zone
         return zone if self.wall == 1 else zone / _CARD_WIDTH
 
 
-def strongest_distortion(width: int, height: int, focal_length: float) -> float:
-    """Return how negative k1 may be, so that distortion is invertible in the image.
+def check_distortion(settings: Any) -> None:
+    """Refuse distortion that is not invertible in the image, whose limit is at 4/27.
 
-    The size is in px, the focal length in image widths. The limit itself is at 4/27.
+    It is `settings.distortion`, k1; `settings` have the width and height of the image as well, px,
+    and the `focal_length` in widths.
     """
-    return 0.13 / _half_view(width, height, focal_length) ** 2
+    strongest = 0.13 / _half_view(settings.width, settings.height, settings.focal_length) ** 2
+    if settings.distortion < -strongest:
+        raise ValueError(
+            f'distortion is {settings.distortion!r}, accepted is a number of at least '
+            f'{-strongest:.3f} with a focal_length of {settings.focal_length:g}'
+        )
 
 
 def drawn_numbers(settings: Any, generator: np.random.Generator) -> list[int]:
@@ -356,7 +361,7 @@ def _coded_targets(
     placements = grid_placements(camera, reach, generator)
     gain = settings.edge_shift if settings.dark else -settings.edge_shift
 
-    hole = settings.pinhole if settings.pinhole >= 0 else proportions(name, file).pinhole
+    hole = settings.proportions.pinhole
     cards, marks, targets = [], [], []
     for number, pixel, size, turn in zip(ids, placements.centres, semi_major, turns, strict=True):
         printed = design(name, number, turn, gain / size, hole, file)

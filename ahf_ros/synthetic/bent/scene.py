@@ -174,7 +174,9 @@ def _printed(
     generator: np.random.Generator,
 ) -> tuple[Printed, int]:
     """Return a target that is printed, turned at random, and its code word."""
-    design = printed_design(settings.family, number, settings.hole, settings.family_file)
+    design = printed_design(
+        settings.family, number, settings.proportions.pinhole, settings.family_file
+    )
     contours, reach = design.contours, settings.proportions.reach
     if not settings.dark:
         reach = settings.proportions.quiet_zone

@@ -10,7 +10,7 @@ from ahf_ros.codes.designs import Proportions, proportions
 from ahf_ros.codes.families import family_in
 from ahf_ros.settings.parameter import check_parameters, parameter
 from ahf_ros.synthetic.layout import finest_grid, quiet_radius
-from ahf_ros.synthetic.scene import SceneSettings, strongest_distortion
+from ahf_ros.synthetic.scene import SceneSettings, check_distortion
 
 STEEPEST = 75.0
 """Largest angle between the view and the normal of a sheet at a target, degrees."""
@@ -132,12 +132,7 @@ class BentSettings:
         """
         check_parameters(self)
         object.__setattr__(self, 'family', family_in(self.family, self.family_file))
-        strongest = strongest_distortion(self.width, self.height, self.focal_length)
-        if self.distortion < -strongest:
-            raise ValueError(
-                f'distortion is {self.distortion!r}, accepted is a number of at least '
-                f'{-strongest:.3f} with a focal_length of {self.focal_length:g}'
-            )
+        check_distortion(self)
         every = (self.fits(count) for count in range(1, self.on_sheet + 1))
         if not all(fitting := list(every)):
             most = fitting.index(False) * self.sheets
@@ -158,18 +153,12 @@ class BentSettings:
     @property
     def proportions(self) -> Proportions:
         """What all targets have in common, in radii of the dot."""
-        return proportions(self.family, self.family_file)
+        return proportions(self.family, self.family_file).chosen(self.polarity, self.pinhole)
 
     @property
     def dark(self) -> bool:
         """Whether targets are dark on white."""
-        printed = self.proportions.polarity if self.polarity == 'auto' else self.polarity
-        return printed == 'dark'
-
-    @property
-    def hole(self) -> float:
-        """Radius of the hole in the dot, in radii of the dot, 0 for none."""
-        return self.proportions.pinhole if self.pinhole < 0 else self.pinhole
+        return self.proportions.polarity == 'dark'
 
     @property
     def focal_pixels(self) -> float:
