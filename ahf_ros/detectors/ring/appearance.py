@@ -13,11 +13,11 @@ import numpy as np
 from ahf_ros.codes.ring import Family
 from ahf_ros.detectors.ring.decoding import Words, bits_at, lengthened
 from ahf_ros.detectors.ring.light import clear_of
-from ahf_ros.detectors.ring.polar import PolarImages
+from ahf_ros.detectors.ring.polar import SOFT_EDGE, PolarImages
 from ahf_ros.features.robust import median
 from ahf_ros.imaging.logarithm import LOG_OFFSET
 
-_BLURRED, _MINIMUM_BLURRED = 1.6, 1.0  # distance from an edge at which it ends: blurs, and px
+_MINIMUM_ASIDE = 1.0  # distance from an edge at which it ends, px
 _INMOST = 0.5  # of the dot, whose ink is that of marks where light is even, dot radii
 _BEYOND = 0.2, 0.7  # the ground beyond a band, dot radii
 _ASIDE = 0.25  # distance from further circles, dot radii
@@ -41,7 +41,7 @@ def unlike_print(
     (number, count), (inner, outer) = words.hidden.shape, family.band
     radii, about = polar.radii, (growth, inner - growth, outer + growth)
     dot, inside, outside = (of[:, None] for of in about)
-    aside = (np.maximum(_BLURRED * polar.blur, _MINIMUM_BLURRED) / polar.size)[:, None]
+    aside = (np.maximum(SOFT_EDGE * polar.blur, _MINIMUM_ASIDE) / polar.size)[:, None]
     clear = clear_of(radii, family.circles, _ASIDE)
     beyond = (radii > outside + np.maximum(aside, _BEYOND[0])) & (radii < outside + _BEYOND[1])
     gap = (radii > 1 + dot + aside) & (radii < inside - aside)

@@ -195,9 +195,11 @@ def decode(
         of_arcs, borders = _free_paths(turned)
         price = _of_borders(inked, mixed, hidden, borders, _border(turned), family)
         # Covers may be as long as they like, as arcs may.
-        both = np.stack([of_word[0], _moved(steps[rows, best], turned)], axis=2)
+        # A first look, which tells whether there is a doubt, knows no lens.
+        ways = [of_word[0], *([_moved(steps[rows, best], turned)] if looks else ())]
         long = of_word[1] + np.float32(1 - _COVERED / _MORE) * more
-        stiff, moved = _covered_paths(both, long[..., None], turned).T.astype(np.float64)
+        paths = _covered_paths(np.stack(ways, axis=2), long[..., None], turned)
+        stiff, moved = paths.T.astype(np.float64)[[0, -1]]
         coded, beside = stiff - of_arcs - price, np.maximum(moved - stiff, 0)
     found = Words(
         words=of_best,

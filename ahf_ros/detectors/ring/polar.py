@@ -33,6 +33,9 @@ DEPTHS = np.array([0.2, 0.4, 0.6, 0.8])
 PART = 256
 """Targets at a time, which bounds the memory."""
 
+SOFT_EDGE = 1.6
+"""Distance from an edge at which it ends, in its blur."""
+
 CIRCLES = 56
 """Of a polar image, which are then less than a tenth of a dot radius apart."""
 
@@ -49,7 +52,7 @@ _UNLIKE = 4.0  # standard deviations of ground, from which a level is unlike the
 _LIGHT = 0.34  # share of the ground that is darker, or has edges, from which that is light
 _GLARE_EDGES = 0.03  # share of the ground, more than edges of glare have
 _WHITE_OUT = 0.6  # share of the ground that is saturated, from which that is no glare
-_SOFT, _ASIDE = 1.6, 0.15  # distance from an edge at which it ends, blurs and dot radii
+_ASIDE = 0.15  # least distance from the band at which its ground may end, dot radii
 _STRAY = 0.03  # share of readings that are bright in a gap that is dark
 _WHITE = 0.7  # share of the step of ink, in ln, from which what ends the ground is white
 _FRAMED = 0.5  # share of directions, from which the ground ends in what is as bright as ink
@@ -319,15 +322,15 @@ def on_dark_ground(
     some = polar.select(bright)
     gap = some.at(np.tile(1 + (inner - 1) * GAP, (len(bright), 1)).T).swapaxes(0, 1)
     gap = gap.reshape(len(bright), -1)
-    limit = medians(gap) / np.sqrt(some.contrast)
+    usual = medians(gap)
+    limit, as_ink = usual / np.sqrt(some.contrast), usual / some.contrast**_WHITE
     farthest = some.gray[some.row, :, -1]
     framed = (gap < limit[:, None]).mean(axis=1) > 1 - _STRAY
-    as_ink = medians(gap) / some.contrast**_WHITE
     framed &= (farthest >= as_ink[:, None]).mean(axis=1) > _FRAMED
     if not framed.any():
         return polar
     bright, some, limit = bright[framed], some.select(framed), limit[framed, None, None]
-    aside = (_SOFT * some.blur / some.size)[:, None]
+    aside = (SOFT_EDGE * some.blur / some.size)[:, None]
     beyond = some.radii >= outer + np.maximum(aside, _ASIDE)
     white = (some.gray[some.row] >= limit) & beyond[:, None]
     first = np.take_along_axis(some.radii, white.argmax(axis=2), axis=1)
