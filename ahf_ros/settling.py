@@ -55,8 +55,7 @@ def evident(targets: Sequence[Target]) -> list[Target]:
 
     Where all families are looked for, words of some are read in nearly any texture. Most are
     doubtful, which is no evidence, and the others are few of one family: one that is certain is
-    evidence, or three to 0.94. What is read in several places, as letters may
-    be, counts once.
+    evidence, or three to 0.94. What is read in several places, as letters may be, counts once.
     """
     shown = {
         family

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from ahf_ros.codes.ring import Family
 from ahf_ros.detectors.ring.circles import REACH
 from ahf_ros.features.circle_fit import Fit, fit_dots
 from ahf_ros.features.frame import affine_frames
@@ -26,6 +27,15 @@ def made_up(x: Sequence[float], share: float = 1.0, radius: float = 10.0) -> Fit
         blur=np.full(count, 0.8),
         edge_shift=np.full(count, -0.3),
     )
+
+
+def inked(x: np.ndarray, y: np.ndarray, word: int, code: Family) -> np.ndarray:
+    """Return where a target has ink, bool, from coordinates on it in dot radii, y down."""
+    radius, angle = np.hypot(x, y), np.arctan2(-y, x) % (2 * np.pi)
+    sector = np.minimum(angle / (2 * np.pi) * code.bits, code.bits - 1).astype(int)
+    inner, outer = code.band
+    band = (radius > inner) & (radius < outer) & (word >> sector & 1 == 1)
+    return np.asarray((radius < 1) | band)
 
 
 def measured(

@@ -7,6 +7,7 @@ import numpy as np
 
 from ahf_ros.codes.ring import family
 from ahf_ros.detectors import create_detector
+from support.ring import inked
 
 WHITE, BLACK = 0.7, 0.05  # reflectances
 RADIUS, PITCH = 6.5, 72  # of dots, and between targets, px
@@ -18,7 +19,6 @@ ROWS, COLUMNS = 3, 4
 def photograph(seed: int) -> tuple[np.ndarray, list[int]]:
     """Return an image as of a phone, which sharpens, of turned targets, and their IDs."""
     generator, code = np.random.default_rng(seed), family('cct12')
-    inner, outer = code.band
     image = np.full((ROWS * PITCH * FINE, COLUMNS * PITCH * FINE), WHITE)
     numbers = generator.choice(len(code.words), ROWS * COLUMNS, replace=False)
     across = (np.arange(PITCH * FINE) + 0.5) / FINE - PITCH / 2
@@ -27,23 +27,17 @@ def photograph(seed: int) -> tuple[np.ndarray, list[int]]:
         turn, (right, down) = generator.uniform(0, 2 * np.pi), generator.uniform(-2, 2, 2)
         x, y = np.meshgrid((across - right) / RADIUS, (across - down) / RADIUS)
         x, y = x * np.cos(turn) - y * np.sin(turn), x * np.sin(turn) + y * np.cos(turn)
-        sector = (np.arctan2(-y, x) % (2 * np.pi) / (2 * np.pi) * code.bits).astype(
-            int
-        ) % code.bits
-        radius = np.hypot(x, y)
-        band = (radius > inner) & (radius < outer) & (code.words[number] >> sector & 1 == 1)
-        dark = np.maximum(np.abs(x), np.abs(y)) < SQUARE * outer
+        dark = np.maximum(np.abs(x), np.abs(y)) < SQUARE * code.band[1]
         where = np.s_[row * PITCH * FINE :, column * PITCH * FINE :]
         part = image[where][: PITCH * FINE, : PITCH * FINE]
-        part[dark & ~band & (radius > 1)] = BLACK
+        part[dark & ~inked(x, y, code.words[number], code)] = BLACK
     light = image.reshape(ROWS * PITCH, FINE, COLUMNS * PITCH, FINE).mean(axis=(1, 3))
     light = cv2.GaussianBlur(light, (0, 0), 0.8)
     gray = 255 * light ** (1 / 2.2)
     gray += 0.8 * (gray - cv2.GaussianBlur(gray, (0, 0), 1.2))
     gray += generator.normal(0, 1.5, gray.shape)
-    return np.clip(np.rint(gray), 0, 255).astype(np.uint8), sorted(
-        code.numbers[of] for of in numbers
-    )
+    shown = sorted(code.numbers[of] for of in numbers)
+    return np.clip(np.rint(gray), 0, 255).astype(np.uint8), shown
 
 
 def test_targets_are_read_whose_dark_ground_ends() -> None:

@@ -6,8 +6,9 @@ import cv2
 import numpy as np
 import pytest
 
-from ahf_ros.codes.ring import Family, family
+from ahf_ros.codes.ring import family
 from ahf_ros.detectors import create_detector
+from support.ring import inked
 
 FOCAL_LENGTH, SIZE, RADIUS = 600.0, 1600, 20.0  # px; of a dot on the axis
 PAPER, INK = 0.75, 0.06  # reflectances
@@ -16,15 +17,6 @@ AROUND = 4  # targets in an image
 MIDDLE = (SIZE - 1) / 2
 
 Shown = tuple[int, float, float]
-
-
-def print_at(x: np.ndarray, y: np.ndarray, word: int, code: Family) -> np.ndarray:
-    """Return where a target has ink, from coordinates on it in dot radii."""
-    radius, angle = np.hypot(x, y), np.arctan2(-y, x) % (2 * np.pi)
-    sector = np.minimum(angle / (2 * np.pi) * code.bits, code.bits - 1).astype(int)
-    inner, outer = code.band
-    band = (radius > inner) & (radius < outer) & (word >> sector & 1 == 1)
-    return np.asarray((radius < 1) | band)
 
 
 def through_fisheye(degrees: float, seed: int) -> tuple[np.ndarray, list[Shown]]:
@@ -54,7 +46,7 @@ def through_fisheye(degrees: float, seed: int) -> tuple[np.ndarray, list[Shown]]
         on_print = seen * ((sight @ normal) / (seen @ normal))[..., None] - sight
         on_print *= FOCAL_LENGTH / RADIUS
         index = 37 * number + seed
-        ink = print_at(on_print @ along, on_print @ across, code.words[index], code)
+        ink = inked(on_print @ along, on_print @ across, code.words[index], code)
         share = ink.reshape(2 * half, FINE, 2 * half, FINE).mean(axis=(1, 3))
         image[top : top + 2 * half, left : left + 2 * half] += (INK - PAPER) * share
         shown.append((index + 1, x, y))
