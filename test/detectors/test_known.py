@@ -15,11 +15,13 @@ from ahf_ros.detectors.ring.hypotheses import Hypotheses
 from ahf_ros.detectors.ring.known import NOTHING_KNOWN, Explained, Prior
 from ahf_ros.evaluation import RIGHT, WRONG, judge
 from ahf_ros.features import frame
+from ahf_ros.features.pyramid import Octave, image_pyramid, octaves
 from ahf_ros.target import Target
 from benchmarks import occluders
 from benchmarks.disturbances import far_apart
 from benchmarks.exposure import Exposure
 from benchmarks.sheets import target_sheet
+from support.drawn_dots import drawn, in_stripes
 from support.ring import made_up
 
 CODE = family('metashape12')
@@ -68,30 +70,36 @@ def certain_ones(polarity: int = 1, count: int = 4) -> Explained:
     return Explained.by(replace(Hypotheses.unread(dots, CODE), confidence=np.ones(count)))
 
 
-@pytest.mark.parametrize('polarity', [1, -1])
-@pytest.mark.parametrize('level', [0, 1])
-def test_a_dot_may_have_the_shape_of_the_targets_about_it(polarity: int, level: int) -> None:
-    others = replace(certain_ones(polarity), shifts=np.full(4, 0.5 * polarity))
-    seen = made_up([130.0, 230.0], radius=8.0 / 2**level)
-    dots = replace(seen, polarity=np.full(2, polarity))
-    alike = others.alike(dots, level)
-    assert np.array_equal(alike.frames[:, :, 2], dots.frames[:, :, 2])
+PLACES = [(130.0, 150.0), (290.0, 190.0)]
+
+
+def oblique_dots(paper: int, ink: int) -> Octave:
+    """Return an octave with dots under stripes, which have grown as `certain_ones` have."""
     grown = 1 + 0.5 / np.sqrt(70)
-    axes = np.array(frame.ellipse_axes(alike.frames))
-    assert (
-        pytest.approx(
-            np.tile([10 * grown / 2**level, 7 * grown / 2**level, 0.6], (2, 1)), rel=1e-6
-        )
-        == axes.T
-    )
+    dots = [(x, y, 10 * grown, 7 * grown, 0.6) for x, y in PLACES]
+    image = in_stripes(drawn(dots, paper, ink, (240, 420)), 24, 0.4)
+    return next(octaves(image_pyramid(image, 90.0), 4.0, 90.0))
 
 
-def test_dots_of_another_size_or_colour_have_their_own_shape() -> None:
-    others = certain_ones()
-    large, bright = made_up([130.0], radius=16.0), replace(made_up([130.0]), polarity=-np.ones(1))
-    assert not len(others.alike(large, 0).frames)
-    assert not len(others.alike(bright, 0).frames)
-    assert not len(certain_ones(count=2).alike(made_up([130.0], radius=8.0), 0).frames)
+@pytest.mark.parametrize('polarity', [1, -1])
+def test_dots_in_the_shape_of_the_targets_about_them_are_found(polarity: int) -> None:
+    others = replace(certain_ones(polarity), shifts=np.full(4, 0.5 * polarity))
+    alike = others.alike(oblique_dots(*((200, 30) if polarity > 0 else (30, 200))))
+    away = np.hypot(*(alike.frames[:, None, :2, 2] - PLACES).transpose(2, 0, 1))
+    best = away.argmin(axis=0)
+    assert (away.min(axis=0) < 1.5).all()
+    assert (alike.share[best] >= np.sort(alike.share)[-2]).all()  # nothing has more votes
+    grown = 1 + 0.5 / np.sqrt(70)
+    axes = np.array(frame.ellipse_axes(alike.frames[best]))
+    assert np.tile([10 * grown, 7 * grown, 0.6], (2, 1)) == pytest.approx(axes.T, rel=1e-5)
+
+
+def test_dots_of_another_colour_or_size_of_octave_and_two_targets_show_no_shape() -> None:
+    octave = oblique_dots(200, 30)
+    assert not len(certain_ones(-1).alike(octave).frames)
+    assert not len(certain_ones(count=2).alike(octave).frames)
+    large = replace(octave, radii=(20.0, 90.0))
+    assert not len(certain_ones().alike(large).frames)
 
 
 IDS = far_apart(CODE, 3, 31)

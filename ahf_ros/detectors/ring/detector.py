@@ -221,10 +221,10 @@ def read_pyramid(
             seen = _read(octave, images, likely, codes, seen, expected, every=every)
             fits.append(dots)
         measured.append((octave, Fit.joined(fits)))
-    for octave, dots in measured if shown else ():
-        alike = seen.targets.alike(seen.left(dots, octave.level), octave.level)
+    for octave, _ in measured if shown else ():
+        alike = seen.targets.alike(octave)
         if len(alike.frames):
-            alike = measure_alike(octave.pyramid.gray, alike, shown)
+            alike = measure_alike(octave.pyramid.gray, alike)
             later = _read(octave, images, alike, shown, seen, expected, every=False)
             seen = seen.with_targets(later)  # all else was read in the shape of the dots
     for octave, dots in measured:

@@ -14,11 +14,11 @@ from ahf_ros.detectors.ring.circles import REACH
 from ahf_ros.detectors.ring.hypotheses import Hypotheses
 from ahf_ros.features import frame
 from ahf_ros.features.array_record import ArrayRecord
-from ahf_ros.features.circle_fit import NO_FITS, Fit
+from ahf_ros.features.dots import NO_DOTS, Dots
+from ahf_ros.features.log_edges import mask_of
+from ahf_ros.features.pyramid import MAXIMUM_RADIUS, Octave
 from ahf_ros.features.robust import NORMAL
-
-NEIGHBOURS = 5
-"""Certain targets that tell the shape of one in their middle."""
+from ahf_ros.features.shape_votes import dots_in_shapes
 
 WHOLE = 0.9
 """Share of the edge of a dot that is explained, or reported, without a word."""
@@ -27,7 +27,6 @@ _AROUND = 0.25  # a whole dot without a word, where its own edge lies, dot radii
 _USUAL_DEVIATION = 1.0  # of the shift of edges of images, px
 _MINIMUM_DEVIATION = 0.3  # of targets of one image, which are not lit and printed alike, px
 _MINIMUM_TARGETS = 3  # certain targets that tell the shift of an image, and the shape of others
-_OF_SIZE = 1.25  # ratio of the radii of dots that may be targets of one size
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,29 +83,30 @@ class Explained(ArrayRecord):
         near = np.hypot(away[..., 0], away[..., 1]) < self.sizes
         return np.asarray(near.any(axis=1))
 
-    def alike(self, dots: Fit, level: int) -> Fit:
-        """Return dots with the shapes of the certain targets about them, where sizes agree.
+    def alike(self, octave: Octave) -> Dots:
+        """Return the dots of an octave in the shapes of the certain targets about them.
 
-        Dots are px of the image that is halved `level` times. An edge of light that touches a dot
-        is taken for a part of its own and makes another ellipse of it; targets of one image that
-        are close to each other have much the same.
+        An edge of light that touches a dot is taken for a part of its own and makes another
+        ellipse of it; targets of one image that are close to each other have much the same.
         """
-        found = [NO_FITS]
+        found = [NO_DOTS]
+        size = frame.mean_radii(self.frames) / 2**octave.level
+        low, high = octave.radii
+        of_size = self.certain & (size >= low) & (size <= high)
         for polarity in (1, -1):
-            known = self.select(self.certain & (self.polarity == polarity))
-            some = dots.select(dots.polarity == polarity)
-            if len(known.frames) < _MINIMUM_TARGETS or not len(some.frames):
+            known_ones = of_size & (self.polarity == polarity)
+            known = self.select(known_ones)
+            if len(known.frames) < _MINIMUM_TARGETS:
                 continue
             grown = 1 + polarity * known.shifts / frame.mean_radii(known.frames)
-            shapes = frame.shapes(frame.scaled(known.frames, grown)) / 4**level
-            near = frame.nearest(frame.enlarged(some.frames, level), known.frames, NEIGHBOURS)
-            axes = frame.axes_of(np.median(shapes[near], axis=1))
-            x, y = some.frames[:, :2, 2].T
-            frames = frame.affine_frames(x, y, *axes)
-            ratio = frame.mean_radii(frames) / some.size
-            like = np.maximum(ratio, 1 / ratio) < _OF_SIZE
-            found.append(replace(some, frames=frames).select(like))
-        return Fit.joined(found)
+            usual = float(np.median(size[known_ones])) / MAXIMUM_RADIUS
+            half = int(np.clip(np.ceil(np.log2(usual)), 1, len(octave.pyramid.edges)))
+            edges = octave.pyramid.edges[half - 1]
+            mask = mask_of(self.outlines_in(octave.level + half), edges.marked.shape)
+            frames = frame.enlarged(frame.scaled(known.frames, grown), -octave.level - half)
+            dots = dots_in_shapes(edges.unmasked(mask), frames, polarity)
+            found.append(replace(dots, frames=frame.enlarged(dots.frames, half)))
+        return Dots.joined(found)
 
     def outlines_in(self, level: int) -> np.ndarray:
         """Return the outlines with edges in the image that is halved `level` times, its px."""

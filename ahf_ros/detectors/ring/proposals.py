@@ -36,6 +36,7 @@ from ahf_ros.features.pyramid import Octave
 from ahf_ros.features.robust import medians
 from ahf_ros.features.small_dots import small_dots_in
 
+_MOST_ALIKE = 64  # dots in the shapes of targets that are looked at
 _THIN = 4.0  # semi-minor axis of a dot whose gap edges of a half may not show, px
 _NARROW = 3.0  # width of a gap, px, that edges of a half do not show on both of its sides
 _PER_SECTOR, _CIRCLES = 5, 36  # angles of the shortest sectors, and circles
@@ -121,22 +122,16 @@ def measure_likely(
     return fit.select(order[fit.share[order] >= ENOUGH]), others
 
 
-def measure_alike(gray: np.ndarray, dots: Fit, families: Sequence[Family]) -> Fit:
-    """Return the dots whose bands give any hope in their shapes, the most hopeful ones first.
+def measure_alike(gray: np.ndarray, dots: Dots) -> Fit:
+    """Return dots in their shapes at the centres of their edges, those with most votes first.
 
-    Each has its own centre, or that of its edges in this shape, whichever gives more hope.
+    No more than the best ones are among them.
     """
+    dots = dots.select(np.argsort(-dots.share, kind='stable')[:_MOST_ALIKE])
     fit = measure_dots(gray, dots, covariances=True)
-    dots = replace(dots, covariance=fit.covariance)
-    moved = replace(dots, frames=dots.frames.copy())
-    moved.frames[:, :2, 2] = fit.frames[:, :2, 2]
-    both = Fit.joined([dots, moved])
-    count = len(dots.frames)
-    hope = hopes(gray, both, families).reshape(2, count)
-    best = hope.argmax(axis=0) * count + np.arange(count)
-    hope = hope.max(axis=0)
-    order = np.argsort(-hope * dots.clearness**2, kind='stable')
-    return both.select(best[order[hope[order] > 0]])
+    frames = dots.frames.copy()
+    frames[:, :2, 2] = fit.frames[:, :2, 2]
+    return replace(fit, frames=frames)
 
 
 def _fit(gray: np.ndarray, dots: Dots | Fit, *, covariances: bool) -> Fit:
