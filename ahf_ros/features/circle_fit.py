@@ -38,6 +38,7 @@ SOFT = 1.0
 
 _SOFT_ROUNDS = 4  # of measurements of soft edges
 _NOISE = 1.0  # of gray values, of 255; the fit scales it to what it finds
+_UNEVEN_LIGHT = 0.1  # error of edges that light causes, in the first round, px
 _MINIMUM_STEP = 1.0  # gray values, that the error of an edge is computed from
 _OUTLIER = 3.0  # times the usual distance from the circle that quarters the weight
 _MINIMUM_SPREAD = 0.5  # that counts as usual, in deviations that noise alone would cause
@@ -55,7 +56,7 @@ _UNEVEN = 0.011  # usual error of slopes where light is no slope within a profil
 _OF_LIGHT, _EVEN = 78.0, 0.0085
 _LONG = 6.0  # radius of dots, px, from which profiles are long enough for slopes to tell of light
 _SYSTEMATIC = 0.001  # standard deviation of what pixels and interpolation do to a centre, px
-_PRIOR_SCALE = 0.003  # standard deviation of the printed proportions of circles and dot
+_PRIOR_SCALE = .03  # standard deviation of the printed proportions of circles and dot
 _PRIOR_PERSPECTIVE = 0.02  # of the projective part, in 1 a dot radius
 _PRIOR_SHIFT = 1.0  # of the shift of edges towards the dark side, px
 _WEAK_PRIOR = 1e-6  # of the other changes, so that they can always be solved for
@@ -69,7 +70,7 @@ class Fit(ArrayRecord):
     polarity: np.ndarray  # int, (k,), 1 for a dark target on bright ground, -1 for a bright one
     contrast: np.ndarray  # (k,), usual gray value of the dark side of edges over the bright side's
     bright: np.ndarray  # (k,), usual gray value of the bright side
-    share: np.ndarray  # (k,), of the expected edges that were measured where they are expected
+    share: np.ndarray  # (k,), of the expected edges, or those of the dot if fewer, that are in place
     deviation: np.ndarray  # (k,), standard deviation of these edges, px
     covariance: np.ndarray  # (k, 2, 2), of the image of the centre, px^2; NaN if not asked for
     blur: np.ndarray  # (k,), of the edges, standard deviation in px
@@ -186,6 +187,11 @@ def fit_circles(
     seen, errors = solution.own.seen, solution.errors
     placed = seen & (solution.relative < _PLACED) & (np.abs(errors) < _PLACED_RADII)
     count = placed.sum(axis=1)
+    shares = [_share(placed, edges.visible)]
+    if projective:
+        # A band about another dot has most of its edges in place, but not those of the dot.
+        dot = circles.group == 0
+        shares.append(_share(placed[:, dot], edges.visible[:, dot]))
     squares = np.where(placed, errors * edges.scale, 0) ** 2
     covariance = np.full((len(frames), 2, 2), np.nan)
     if covariances:
@@ -196,12 +202,17 @@ def fit_circles(
         polarity=circles.polarity[:, 0],
         contrast=solution.own.contrast,
         bright=median(np.maximum(edges.bright, 0), seen),
-        share=count / np.maximum(edges.visible.sum(axis=1), 1),
+        share=np.min(shares, axis=0),
         deviation=np.sqrt(squares.sum(axis=1) / np.maximum(count, 1)),
         covariance=affine @ covariance @ affine.transpose(0, 2, 1) + _SYSTEMATIC**2 * np.eye(2),
         blur=blur,
         edge_shift=-solution.changes[:, -1] if projective else np.zeros(len(frames)),
     )
+
+
+def _share(placed: np.ndarray, visible: np.ndarray) -> np.ndarray:
+    """Return the shares of the visible edges that are in place, shape (k,), both (k, m)."""
+    return np.asarray(placed.sum(axis=1) / np.maximum(visible.sum(axis=1), 1))
 
 
 @dataclass(frozen=True, slots=True)
@@ -229,18 +240,26 @@ def _solve(edges: Edges, circles: Circles, window: np.ndarray, projective: bool)
     light = smooth_slopes(edges.slope - circles.polarity * common, own.weights, window, prior)
     displacement = (edges.offset - edges.sensitivity * light.slope) / edges.scale
     noise = _NOISE * np.sqrt(2 * np.sqrt(np.pi) * USUAL_BLUR)
-    deviation = noise / np.maximum(edges.bright - edges.dark, _MINIMUM_STEP) / edges.scale
-    model = _DisplacementModel(circles, edges.scale, projective)
+    of_noise = noise / np.maximum(edges.bright - edges.dark, _MINIMUM_STEP) / edges.scale
+    usual_noise = median(of_noise, own.seen)[:, None]
+    # Noise moves edges in shadow, light moves all of them.
+    deviation = np.hypot(of_noise, _UNEVEN_LIGHT / edges.scale) if projective else of_noise
 
     def solve(weights: np.ndarray) -> tuple[tuple[np.ndarray, ...], np.ndarray]:
-        changes, normal = model.solve(displacement, weights)
+        nonlocal deviation
+        changes, normal = model.solve(displacement, weights / deviation**2)
         errors = displacement - model.displacement(changes)
+        if projective:
+            usual = spread(np.abs(errors), own.seen, 0.0)
+            deviation = np.hypot(of_noise, np.sqrt(np.maximum(usual**2 - usual_noise**2, 0)))
         return (changes, normal, errors), np.abs(errors) / deviation
 
-    weights = own.weights / deviation**2
-    (changes, normal, errors), relative, robust = reweight(
-        solve, weights, lambda sizes: _OUTLIER * spread(sizes, own.seen, _MINIMUM_SPREAD), _ROUNDS
-    )
+    def scale(sizes: np.ndarray) -> np.ndarray:
+        return _OUTLIER * spread(sizes, own.seen, _MINIMUM_SPREAD)
+
+    model = _DisplacementModel(circles, edges.scale, projective)
+    (changes, normal, errors), relative, robust = reweight(solve, own.weights, scale, _ROUNDS)
+    weights, robust = (of / deviation**2 for of in (own.weights, robust))
     return _Solution(own, light, model, changes, normal, weights, errors, relative, robust)
 
 

@@ -150,3 +150,21 @@ def test_the_covariance_is_that_of_the_errors(deviation, least):
     errors = fit.frames[:, :2, 2] - corners - places
     squares = np.einsum('ki,kij,kj->k', errors, np.linalg.inv(fit.covariance), errors)
     assert least < np.mean(squares) < 2.6
+
+
+def test_edges_of_the_band_alone_do_not_make_a_share():
+    """A band is where it should be, and the dot in its middle is smaller than its print."""
+    radii = (0.8, 2.0, 3.0)
+    count = 48
+    angles = 2 * np.pi * np.arange(count) / count
+    circles = Circles(
+        angles=np.tile(angles, 3),
+        radii=np.repeat([1.0, 2.0, 3.0], count),
+        polarity=np.repeat([[1, -1, 1]], count, axis=1),
+        group=np.repeat([0, 1, 1], count),
+    )
+    place = dot_frame(50.0, 50.0, 14.0)
+    fit = fit_circles(
+        drawn(place, radii=radii).astype(np.float32), place, circles, reach=0.15, projective=True
+    )
+    assert fit.share[0] < 0.1
