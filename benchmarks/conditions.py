@@ -19,10 +19,11 @@ import numpy as np
 from ahf_ros.codes import RING_NAMES
 from ahf_ros.codes.ring import FAMILY_NAMES, family, ring_family
 from ahf_ros.detectors import DetectorSettings
+from ahf_ros.synthetic.bent.picture import render_bent
 from ahf_ros.synthetic.patterns import LIGHT_NAMES, benchmark_lights
 from ahf_ros.synthetic.scene import SceneSettings, render
 from ahf_ros.target import Target, TrueTarget
-from benchmarks import occluders
+from benchmarks import bent, occluders
 from benchmarks.disturbed import blurred, compressed, noisy, overlapping
 from benchmarks.exposure import Exposure
 from benchmarks.lookalikes import LOOKALIKES
@@ -54,12 +55,15 @@ SHADES = (0.3, 0.12)
 RADII_OF_SMALL, RADII_IN_PHOTOGRAPHS = (4.5, 9.0), (4.5, 20.0)
 """Smallest and largest radius of dots of small targets, and in photographs, px."""
 
+RADII_OF_BENT = (5.5, 14.0)
+"""Smallest and largest radius of dots on bent sheets, px."""
+
 PHOTOGRAPHS = 15
 """Images of a phone, of each seed."""
 
 CELLS = COLUMNS * ROWS
 
-COMMON = ('light', 'small', 'phone', 'drawn family', 'clean', 'exposure', 'quality')
+COMMON = ('light', 'small', 'phone', 'bent', 'drawn family', 'clean', 'exposure', 'quality')
 """Conditions that most targets are under; the others are rare."""
 
 FOREIGN = ('other family', 'look-alikes', 'clutter')
@@ -101,6 +105,7 @@ def scenes(seed: int) -> Iterator[Scene]:
         yield Scene('light', rendering.image, rendering.targets, settings.family)
     yield from small(seed)
     yield from photographed(seed)
+    yield from sheets_bent(seed)
     yield from drawn(seed)
     yield from disturbed(seed)
     yield from strange(seed)
@@ -155,6 +160,20 @@ def photographed(seed: int) -> Iterator[Scene]:
             yield Scene('phone', image, rendering.targets, settings.family)
         else:
             yield Scene('other family', image, (), _other_print(settings.family, generator))
+
+
+def sheets_bent(seed: int) -> Iterator[Scene]:
+    """Yield bent sheets by the second maker; every fourth one is read as another family."""
+    generator = np.random.default_rng([seed, 11])
+    for index, (light, polarity) in enumerate(product(bent.LIGHTS, ['dark', 'dark', 'bright'])):
+        name = _any_family(generator)
+        radius = float(np.exp(generator.uniform(*np.log(RADII_OF_BENT))))
+        drawn_by = int(generator.integers(2**31))
+        rendering = render_bent(bent.settings(name, polarity, light, radius, drawn_by, 24))
+        if index % 4:
+            yield Scene('bent', rendering.image, rendering.targets, name)
+        else:
+            yield Scene('other family', rendering.image, (), _other_print(name, generator))
 
 
 def strange_in_light(seed: int) -> Iterator[Scene]:
