@@ -25,6 +25,7 @@ from ahf_ros.detectors.contract import (
     Drafter,
     EarlyStopping,
     Expecting,
+    Glancing,
     Refiner,
     Searching,
 )
@@ -115,6 +116,8 @@ class SeveralDetector:
         for part in self.parts:
             if left.min() == left.max():  # all that there was is painted over
                 results.append([])
+            elif left is not image and pyramid and self._passes(part, pyramid):
+                results.append([])
             elif pyramid and isinstance(part, Searching):
                 results.append(part.search(pyramid))
             else:
@@ -123,6 +126,11 @@ class SeveralDetector:
                 left = without_targets(left, [it for it in results[-1] if it.id != UNDECODED])
                 pyramid = self._pyramid(left) if searching else None
         return results
+
+    def _passes(self, part: Detector, pyramid: ImagePyramid) -> bool:
+        """Return whether a glance at what is painted over shows nothing for a detector."""
+        glancing = isinstance(part, Glancing) and not self.settings.report_undecoded
+        return glancing and not part.glance(pyramid)
 
     def _pyramid(self, image: np.ndarray) -> ImagePyramid:
         """Return the pyramid of an image that detectors share."""
