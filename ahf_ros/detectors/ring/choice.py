@@ -8,6 +8,7 @@ those that none of the clearest dots shows are not read at all.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import chain
 
 import numpy as np
 
@@ -15,13 +16,13 @@ from ahf_ros.codes.ring import Family, words_of_print
 from ahf_ros.detectors.ring.decoding import DOUBT
 from ahf_ros.detectors.ring.families import contested, decoded, present_families
 from ahf_ros.detectors.ring.hypotheses import Hypotheses
-from ahf_ros.detectors.ring.proposals import HOPEFUL, bounds, measure_likely
+from ahf_ros.detectors.ring.proposals import HOPEFUL, Print, bounds, measure_likely
 from ahf_ros.detectors.ring.reading import read_bands
 from ahf_ros.detectors.ring.rivals import has_all
 from ahf_ros.features.circle_fit import ENOUGH, Fit
 
 _CLEAREST = 32  # dots that tell the family of an image
-_OTHERS = 1024  # clearest ones of the others: texture and letters have thousands
+_OTHERS = 2048  # clearest ones of the others: texture and letters have thousands
 _CLEAR = 0.5  # bound of the mean evidence of a reading, which spots of light hardly reach
 _DOUBTED = 0.1  # probability that all words are wrong, below which they show a family
 _ROUGH = (0.0,)  # shifts of edges that are tried to find these, px
@@ -72,17 +73,7 @@ def _words_shown(
         return []
     dots, mean = dots.select(hopeful), mean[:, hopeful]
     likely = mean > mean.max(axis=0) - _NEARLY
-    of_prints = np.maximum(mean, 0).mean(axis=1)
-    # Whatever has a number of sectors has its multiples as well.
-    for index, (band, bits) in enumerate(prints):
-        if any(
-            of_prints[other] > of_prints[index] - _NEARLY
-            for other, (of_band, fewer) in enumerate(prints)
-            if of_band == band and fewer < bits and bits % fewer == 0
-        ):
-            of_prints[index] -= _NEARLY
-    by_print = np.argsort(-of_prints, kind='stable')[:tried].tolist()
-    for rank, best in enumerate(by_print):
+    for rank, best in enumerate(_likeliest(prints, np.maximum(mean, 0))[:tried]):
         band, bits = prints[best]
         same = [code for code in families if code.band == band and bits % code.bits == 0]
         read: list[Hypotheses] = []
@@ -98,6 +89,26 @@ def _words_shown(
                     for code, word in zip(every.families, decoded(every)[1].tolist(), strict=True)
                 ]
     return []
+
+
+def _likeliest(prints: Sequence[Print], mean: np.ndarray) -> list[int]:
+    """Return the indices of prints, the likeliest first, from the bounds of k dots, (prints, k).
+
+    They are by turns those that all dots may have and those that the best two have: where light
+    makes most of the dots, few are of targets, but none has a higher bound.
+    """
+    orders = []
+    for of_prints in (mean.mean(axis=1), np.sort(mean, axis=1)[:, -2:].mean(axis=1)):
+        # Whatever has a number of sectors has its multiples as well.
+        for index, (band, bits) in enumerate(prints):
+            if any(
+                of_prints[other] > of_prints[index] - _NEARLY
+                for other, (of_band, fewer) in enumerate(prints)
+                if of_band == band and fewer < bits and bits % fewer == 0
+            ):
+                of_prints[index] -= _NEARLY
+        orders.append(np.argsort(-of_prints, kind='stable').tolist())
+    return list(dict.fromkeys(chain.from_iterable(zip(*orders, strict=True))))
 
 
 def _read(gray: np.ndarray, dots: Fit, families: Sequence[Family]) -> Hypotheses:
