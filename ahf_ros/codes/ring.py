@@ -311,12 +311,14 @@ def words_of_print(code: Family, word: int, families: tuple[Family, ...]) -> dic
     edges = np.flatnonzero(inked != np.roll(inked, 1))
     widest = gcd(code.bits, *np.diff(edges).tolist())
     blocks = np.roll(inked, -edges[0])[::widest]  # the print in as few sectors as show it
-    words = {}
-    for other in families:
-        times, rest = divmod(other.bits, len(blocks))
-        if rest or (other.band, other.circles) != (code.band, code.circles):
-            continue
-        spread = int(np.repeat(blocks, times) @ (1 << np.arange(other.bits)))
-        if other.number(spread):
-            words[other] = int(other.canonical(spread))
-    return words
+    alike = [
+        other
+        for other in families
+        if other.bits % len(blocks) == 0
+        and (other.band, other.circles) == (code.band, code.circles)
+    ]
+    spread = {}
+    for bits in {other.bits for other in alike}:
+        repeated = np.repeat(blocks, bits // len(blocks)) @ (1 << np.arange(bits))
+        spread[bits] = int(smallest_rotation(repeated, bits))
+    return {other: spread[other.bits] for other in alike if spread[other.bits] in other.words}

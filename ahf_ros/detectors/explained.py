@@ -41,17 +41,17 @@ def without_targets(image: np.ndarray, targets: Iterable[Target]) -> np.ndarray:
     left = image.copy()
     height, width = image.shape
     angles = np.arange(_ANGLES) * 2 * np.pi / _ANGLES
-    for target in targets:
-        (frame,) = affine_frames(*np.atleast_2d([target.x, target.y, *_reach(target)]).T)
-        rim = np.column_stack([np.cos(angles), np.sin(angles), np.ones(_ANGLES)]) @ frame.T
-        x, y = np.rint(rim[:, :2].T).astype(int)
+    ellipses = np.array([(it.x, it.y, *_reach(it)) for it in targets]).reshape(-1, 5)
+    frames = affine_frames(*ellipses.T)
+    circle = np.stack([np.cos(angles), np.sin(angles), np.ones(_ANGLES)])
+    rims = np.rint((frames @ circle)[:, :2]).astype(int)
+    for (x, y), inverse in zip(rims, np.linalg.inv(frames), strict=True):
         about = image[y.clip(0, height - 1), x.clip(0, width - 1)].astype(float)
         rows = slice(max(y.min(), 0), max(y.max() + 1, 0))
         columns = slice(max(x.min(), 0), max(x.max() + 1, 0))
         part = left[rows, columns]
         if not part.size:
             continue
-        inverse = np.linalg.inv(frame)
         down, right = np.ogrid[rows, columns][:2]
         down, right = down[: len(part)], right[:, : part.shape[1]]
         across, along = (

@@ -216,7 +216,10 @@ def _looks(
         for number, (octave, found) in enumerate(zip(of_octaves, search(of_octaves), strict=True))
         for dots, largest in found
     ]
-    frames = likely_rings(Circles.joined(circles), [it.radii for it in of_octaves], kinds)
+    every = Circles.joined(circles)
+    if not len(every.frames):
+        return {octave.level: [] for octave in of_octaves}
+    frames = likely_rings(every, [it.radii for it in of_octaves], kinds)
     images = [it.pyramid.gray for it in of_octaves]
     lights = [of for part in (_FULL, _HALVES) for of in _first_lights(images[part], frames[part])]
     return {

@@ -103,9 +103,9 @@ class GsiDetector(FamilyDetector):
 
     def _obvious(self, octave: Octave) -> list[Target]:
         """Return the obvious targets of an octave, in its pixels."""
-        code = self.design
-        _, certain = obvious_targets(octave.pyramid, (*octave.radii, self.settings.polarities), code)
-        return report(certain, code)
+        code, kind = self.design, (*octave.radii, self.settings.polarities)
+        _, certain = obvious_targets(octave.pyramid, kind, code)
+        return report(certain, code) if len(certain.words) else []
 
     @one_blas_thread()
     def refine(self, image: np.ndarray, targets: Sequence[Target]) -> list[Target]:
