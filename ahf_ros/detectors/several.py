@@ -32,10 +32,12 @@ from ahf_ros.detectors.contract import (
 from ahf_ros.detectors.evidence import is_clear
 from ahf_ros.detectors.explained import without_targets
 from ahf_ros.features.common_search import CommonSearch
+from ahf_ros.features.dot_search import whole_outlines
 from ahf_ros.features.pyramid import ImagePyramid, image_pyramid
 from ahf_ros.imaging.image import as_gray, check_image
 from ahf_ros.target import UNDECODED, DottedTarget, Target, sorted_targets
 
+_SMALLEST = 1.0  # radius of an outline in a half of the image that any detector looks for, px
 _DIGITS = 2  # of a confidence, beyond which one is not surer than another
 
 
@@ -111,12 +113,11 @@ class SeveralDetector:
         """Return the targets of each detector; those that search for dots do so together."""
         check_image(image)
         searching = sum(isinstance(it, Searching) for it in self.parts) > 1
-        left, pyramid = image, self._pyramid(image) if searching else None
+        left, pyramid, outlined = image, self._pyramid(image) if searching else None, True
         results: list[list[Target]] = []
         for part in self.parts:
-            if left.min() == left.max():  # all that there was is painted over
-                results.append([])
-            elif left is not image and pyramid and self._passes(part, pyramid):
+            nothing = left.min() == left.max()  # all that there was is painted over
+            if nothing or (left is not image and self._passes(part, pyramid, outlined)):
                 results.append([])
             elif pyramid and isinstance(part, Searching):
                 results.append(part.search(pyramid))
@@ -125,12 +126,14 @@ class SeveralDetector:
             if self.family == AUTO and is_clear(results[-1]):
                 left = without_targets(left, [it for it in results[-1] if it.id != UNDECODED])
                 pyramid = self._pyramid(left) if searching else None
+                outlined = pyramid is not None and _has_outlines(pyramid)
         return results
 
-    def _passes(self, part: Detector, pyramid: ImagePyramid) -> bool:
-        """Return whether a glance at what is painted over shows nothing for a detector."""
-        glancing = isinstance(part, Glancing) and not self.settings.report_undecoded
-        return glancing and not part.glance(pyramid)
+    def _passes(self, part: Detector, pyramid: ImagePyramid | None, outlined: bool) -> bool:
+        """Return whether a glance at an image that is painted over shows nothing for a detector."""
+        if self.settings.report_undecoded or not (pyramid and isinstance(part, Glancing)):
+            return False
+        return not (outlined and part.glance(pyramid))
 
     def _pyramid(self, image: np.ndarray) -> ImagePyramid:
         """Return the pyramid of an image that detectors share."""
@@ -173,6 +176,12 @@ class SeveralDetector:
         for target in found:
             known = target.id == UNDECODED or target.family in families
             yield target if known else replace(target, family=families[0])
+
+
+def _has_outlines(pyramid: ImagePyramid) -> bool:
+    """Return whether an image has whole outlines of circles of any size, as glances look for."""
+    sizes = _SMALLEST, max(pyramid.gray.shape)
+    return any(len(whole_outlines(edges, *sizes).frames) for edges in pyramid.edges)
 
 
 def _radius(target: Target) -> float:

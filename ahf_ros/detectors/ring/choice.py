@@ -85,7 +85,7 @@ def _words_shown(
             every = Hypotheses.joined(read)
             if np.prod(1 - every.confidence) < _DOUBTED:
                 return [
-                    words_of_print(code, word, tuple(families))
+                    words_of_print(code, word, families)
                     for code, word in zip(every.families, decoded(every)[1].tolist(), strict=True)
                 ]
     return []
