@@ -155,7 +155,7 @@ class CctagDetector(FamilyDetector):
                 continue
             rings = _owned(light, rings, look.polarity, look.family)
             rings = contested(gray, rings, look.polarity, look.family)
-            found += self._targets(_single(rings), look.family.name)
+            found += self._targets(_single(rings), look)
         return found
 
     def _shown(self, rings: Aligned) -> np.ndarray:
@@ -164,7 +164,7 @@ class CctagDetector(FamilyDetector):
         shown: np.ndarray = undecoded | (rings.confidence >= _CERTAIN)
         return shown
 
-    def _targets(self, rings: Aligned, family: str) -> list[Target]:
+    def _targets(self, rings: Aligned, look: _Look) -> list[Target]:
         """Return the targets of the readings that are sure enough."""
         rings = rings.select(self._shown(rings))
         decoded = rings.confidence >= _CERTAIN
@@ -172,7 +172,7 @@ class CctagDetector(FamilyDetector):
         certainty = np.where(decoded, rings.confidence, 0.0)
         return targets_from_frames(
             *(rings.frames, rings.covariance, ids, rings.ids, certainty),
-            *(family, rings.edge_shift),
+            *(look.family.name, rings.edge_shift, look.polarity),
         )
 
 
