@@ -114,8 +114,9 @@ def _families(targets: Iterable[Target]) -> set[str]:
     return {target.family for target in targets if target.id != UNDECODED}
 
 
-def _likely_families(targets: Iterable[Target]) -> set[str]:
-    return {it.likely_family for it in targets if isinstance(it, UndecodedTarget)}
+def _family(target: Target) -> str:
+    """Return the family of a target, or the likely one where it is not decoded."""
+    return target.likely_family if isinstance(target, UndecodedTarget) else target.family
 
 
 def _parts(image: np.ndarray) -> list[Callable[[], np.ndarray]]:
@@ -296,7 +297,7 @@ class SettlingIdentifier(Identifier):
         if self._contested or {self._kinds[name] for name in families} & _READ_BY_NAME:
             return
         for values, seen in self._looked.found.items() if self._looked else ():
-            own = [it for it in seen if {it.family, getattr(it, "likely_family", "")} & {*families}]
+            own = [it for it in seen if _family(it) in families]
             if _families(own) == {*families} and is_clear(own):
                 yield values, own
 

@@ -57,7 +57,8 @@ def leading(
 def best_targets(targets: Sequence[_Target], reach: float = 0.0) -> list[_Target]:
     """Return the most certain target of each place and each print, decoded ones first.
 
-    A print is an ID of a family in one polarity, see `Target.print`. No other lies in the reach of a target, in radii of its dot. Where it is 0 only IDs count.
+    A print is an ID of a family in one polarity, see `Target.print`. No other lies in the reach of
+    a target, in radii of its dot. Where that is 0 only prints count.
     """
     order = sorted(targets, key=lambda it: (it.id == UNDECODED, -it.confidence, it.y, it.x))
     x, y, minor = np.array([(it.x, it.y, it.semi_minor) for it in order]).reshape(-1, 3).T

@@ -130,7 +130,7 @@ class SeveralDetector:
         return results
 
     def _passes(self, part: Detector, pyramid: ImagePyramid | None, outlined: bool) -> bool:
-        """Return whether a glance at an image that is painted over shows nothing for a detector."""
+        """Return whether a glance at what is not painted over shows nothing for a detector."""
         if self.settings.report_undecoded or not (pyramid and isinstance(part, Glancing)):
             return False
         return not (outlined and part.glance(pyramid))

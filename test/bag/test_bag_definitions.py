@@ -11,7 +11,10 @@ from ahf_ros.target import UNDECODED, FilterState, Identification, Target
 FOUND = Identification(
     (
         Target(UNDECODED, 0, -0.25, 1e-9, 4.3, 4.1, -1.5, 0.3),
-        Target(516, 2**20 - 1, 3983.123456789, 2655.5, 20.1, 19.7, 0.2, 1.0, (1e-4, 0, 0, 4e-4), polarity=-1),
+        Target(
+            *(516, 2**20 - 1, 3983.123456789, 2655.5, 20.1, 19.7, 0.2, 1.0, (1e-4, 0, 0, 4e-4)),
+            polarity=-1,
+        ),
     ),
     54,
     FilterState(True, 2.7, 0.13, 1700.3, 2.2, 200, 12, 3.1),

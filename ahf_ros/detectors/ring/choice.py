@@ -8,7 +8,6 @@ those that none of the clearest dots shows are not read at all.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import chain
 
 import numpy as np
 
@@ -30,7 +29,7 @@ _SAMPLE = 8  # of those that seem to have a print, which are read first
 _LIKELIEST = 16  # dots to have a print, of which none shows that it is not there
 _CONCEIVABLE = 0.1  # confidence of a word of many, from which it may be certain as one of few
 _NEARLY = 0.05  # mean evidence of a reading, by which a print is as good as the best one
-_PRINTS = 3  # the most likely ones, which are tried on the same dots
+_PRINTS = 4  # the most likely ones, which are tried on the same dots
 
 
 def choose_families(gray: np.ndarray, dots: Fit, families: Sequence[Family]) -> list[Family]:
@@ -94,8 +93,8 @@ def _words_shown(
 def _likeliest(prints: Sequence[Print], mean: np.ndarray) -> list[int]:
     """Return the indices of prints, the likeliest first, from the bounds of k dots, (prints, k).
 
-    They are by turns those that all dots may have and those that the best two have: where light
-    makes most of the dots, few are of targets, but none has a higher bound.
+    That which all dots may have comes before those that the best two have: where light makes most
+    of the dots, few are of targets, but none has a higher bound.
     """
     orders = []
     for of_prints in (mean.mean(axis=1), np.sort(mean, axis=1)[:, -2:].mean(axis=1)):
@@ -108,7 +107,8 @@ def _likeliest(prints: Sequence[Print], mean: np.ndarray) -> list[int]:
             ):
                 of_prints[index] -= _NEARLY
         orders.append(np.argsort(-of_prints, kind='stable').tolist())
-    return list(dict.fromkeys(chain.from_iterable(zip(*orders, strict=True))))
+    of_all, of_best = orders
+    return list(dict.fromkeys([of_all[0], *of_best]))
 
 
 def _read(gray: np.ndarray, dots: Fit, families: Sequence[Family]) -> Hypotheses:

@@ -92,10 +92,11 @@ def settle_same_prints(hypotheses: Hypotheses, families: Sequence[Family]) -> Hy
         return hypotheses
     codes = decoded(hypotheses)[1]
     certain = np.flatnonzero(hypotheses.certain).tolist()
-    prints: dict[int, dict[Family, int]] = dict.fromkeys(certain, {})
+    prints: dict[int, dict[Family, int]] = {}
     for code in dict.fromkeys(hypotheses.families[certain]):
         own = [index for index in certain if hypotheses.families[index] is code]
         prints |= zip(own, words_of_prints(code, codes[own], families), strict=True)
+    prints = {index: prints[index] for index in certain}
     present, sure = present_families(list(prints.values()))
     options = {
         index: _narrowest({code: word for code, word in words.items() if code in present})
