@@ -162,15 +162,6 @@ class Searching(Protocol):
 
 
 @runtime_checkable
-class Glancing(Searching, Protocol):
-    """A detector that tells in little time whether it is worth while to search an image."""
-
-    def glance(self, pyramid: ImagePyramid) -> list[Target]:
-        """Return the targets of one image that a call finds in even light, for the most part."""
-        ...
-
-
-@runtime_checkable
 class Narrowing(Protocol):
     """A detector of many families that can be made to look for some of them only."""
 

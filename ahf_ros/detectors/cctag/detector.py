@@ -8,7 +8,7 @@ what is left, the rings of several IDs are brought onto the image, and the best 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 from typing import ClassVar
@@ -89,23 +89,14 @@ class CctagDetector(FamilyDetector):
     @one_blas_thread()
     def search(self, pyramid: ImagePyramid) -> list[Target]:
         """Identify the targets of one image; see `Searching`."""
-        return self._searched(_doubled(pyramid), all_circles)
-
-    @one_blas_thread()
-    def glance(self, pyramid: ImagePyramid) -> list[Target]:
-        """Identify targets of which a circle has a whole outline; see `Glancing`."""
-        return self._searched(pyramid, whole_circles)
-
-    def _searched(self, pyramid: ImagePyramid, search: Search) -> list[Target]:
-        """Return the targets whose circles a search finds."""
-        radii = self.settings.radii
+        doubled, radii = _doubled(pyramid), self.settings.radii
         kinds = list(product(self.settings.polarities, self.design))
-        looks = _looks(list(octaves(pyramid, *radii)), kinds, search)
+        looks = _looks(list(octaves(doubled, *radii)), kinds)
 
         def identify(octave: Octave) -> list[Target]:
             return self._identify(octave.pyramid.gray, looks[octave.level])
 
-        found = targets_of_octaves(pyramid, radii, identify, self.refine)
+        found = targets_of_octaves(doubled, radii, identify, self.refine)
         return sorted_targets(best_targets(found, 1.0))
 
     @one_blas_thread()
@@ -186,24 +177,8 @@ class _Look:
     lights: Lights  # about those of the first that may be targets, of one edge at the most
 
 
-Search = Callable[[Sequence[Octave]], list[list[tuple[Dots, float]]]]
-"""From octaves to circles that targets of each may have, in its pixels, and how many times larger
-their outermost circles may be."""
-
-
-def all_circles(of_octaves: Sequence[Octave]) -> list[list[tuple[Dots, float]]]:
-    """Return all circles that edges make, or vote for."""
-    found = zip(of_octaves, _circles(of_octaves), strict=True)
-    return [[(of, LARGEST), *_common_centres(octave)] for octave, of in found]
-
-
-def whole_circles(of_octaves: Sequence[Octave]) -> list[list[tuple[Dots, float]]]:
-    """Return the circles with a whole outline."""
-    return [[(_whole(octave), LARGEST)] for octave in of_octaves]
-
-
 def _looks(
-    of_octaves: Sequence[Octave], kinds: Sequence[tuple[int, CircleFamily]], search: Search
+    of_octaves: Sequence[Octave], kinds: Sequence[tuple[int, CircleFamily]]
 ) -> dict[int, list[_Look]]:
     """Return what looks like targets of some colours and families, by the levels of octaves.
 
@@ -213,8 +188,8 @@ def _looks(
         return {}
     circles = [
         Circles.at(octave.pyramid.gray, dots, number, largest)
-        for number, (octave, found) in enumerate(zip(of_octaves, search(of_octaves), strict=True))
-        for dots, largest in found
+        for number, (octave, of) in enumerate(zip(of_octaves, _circles(of_octaves), strict=True))
+        for dots, largest in ((of, LARGEST), *_common_centres(octave))
     ]
     every = Circles.joined(circles)
     if not len(every.frames):
@@ -433,18 +408,13 @@ def _circles(of_octaves: Sequence[Octave]) -> list[Dots]:
     found = []
     for octave in of_octaves:
         least, largest = octave.radii[0] * _INNERMOST, octave.radii[1]
+        whole = whole_dots(octave.pyramid, max(least, _SMALLEST), largest, _COLOURS)
         level = octave.level - first.level
         own = major / 2**level
         of_size = voted.select((own * _BEYOND >= least) & (own <= largest * _BEYOND))
         reduced = replace(of_size, frames=frame.enlarged(of_size.frames, -level))
-        found.append(Dots.joined([_whole(octave), reduced]))
+        found.append(Dots.joined([whole, reduced]))
     return found
-
-
-def _whole(octave: Octave) -> Dots:
-    """Return dots with a whole outline that may be circles of targets, in px of the octave."""
-    least = max(octave.radii[0] * _INNERMOST, _SMALLEST)
-    return whole_dots(octave.pyramid, least, octave.radii[1], _COLOURS)
 
 
 def _common_centres(octave: Octave) -> list[tuple[Dots, float]]:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import ClassVar
 
 import numpy as np
@@ -17,7 +16,7 @@ from ahf_ros.blas import one_blas_thread
 from ahf_ros.codes.dots import DotFamily
 from ahf_ros.detectors.claims import best_targets
 from ahf_ros.detectors.contract import DetectorSettings, FamilyDetector, moved_targets
-from ahf_ros.detectors.dots.discs import SEARCHES, Search, judged
+from ahf_ros.detectors.dots.discs import judged, small_discs, voted_discs, whole_discs
 from ahf_ros.detectors.dots.rings import CERTAIN, Rings, fit_targets, read_discs, report
 from ahf_ros.features.ellipse_targets import ellipse_fields
 from ahf_ros.features.frame import affine_frames, ellipse_axes
@@ -50,17 +49,7 @@ class DotsDetector(FamilyDetector):
     @one_blas_thread()
     def search(self, pyramid: ImagePyramid) -> list[Target]:
         """Identify the targets of one image; see `Searching`."""
-        return self._searched(pyramid, SEARCHES)
-
-    @one_blas_thread()
-    def glance(self, pyramid: ImagePyramid) -> list[Target]:
-        """Identify targets whose disc or border has a whole outline; see `Glancing`."""
-        return self._searched(pyramid, SEARCHES[:1])
-
-    def _searched(self, pyramid: ImagePyramid, searches: Sequence[Search]) -> list[Target]:
-        """Return the targets whose discs some searches find."""
-        identify = partial(self._identify, searches)
-        found = targets_of_octaves(pyramid, self.settings.radii, identify, self.refine)
+        found = targets_of_octaves(pyramid, self.settings.radii, self._identify, self.refine)
         return sorted_targets(best_targets(found, self.design.border_radius))
 
     @one_blas_thread()
@@ -94,25 +83,20 @@ class DotsDetector(FamilyDetector):
         ]
         return moved_targets(targets, dotted, places, good)
 
-    def _identify(self, searches: Sequence[Search], octave: Octave) -> list[DottedTarget]:
+    def _identify(self, octave: Octave) -> list[DottedTarget]:
         """Return the targets of an octave, in its pixels."""
         low, high = octave.radii
         settings = replace(self.settings, min_radius=low, max_radius=high)
         code = self.design
-        rings = find_rings(octave.pyramid, settings, code, searches)
+        rings = find_rings(octave.pyramid, settings, code)
         return report(rings, settings, code) if len(rings.words) else []
 
 
-def find_rings(
-    pyramid: ImagePyramid,
-    settings: DetectorSettings,
-    code: DotFamily,
-    searches: Sequence[Search] = SEARCHES,
-) -> Rings:
+def find_rings(pyramid: ImagePyramid, settings: DetectorSettings, code: DotFamily) -> Rings:
     """Return all rings of dots that an image may show, before any decision."""
     found: list[Rings] = []
     known = np.zeros((0, 3, 3))
-    for search in searches:
+    for search in (whole_discs, voted_discs, small_discs):
         discs = judged(pyramid, search(pyramid, settings, code, known), known, code)
         rings = read_discs(pyramid, discs, code)
         known = np.concatenate([known, rings.frames[rings.of_word >= CERTAIN]])

@@ -9,7 +9,6 @@ Any light has steps. Those of a target lie on three circles at once and have one
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import cv2
@@ -108,13 +107,6 @@ def small_discs(
     for region in open_regions(pyramid.edges[0], outlines):
         found += _blobs(pyramid, region, settings)
     return Dots.joined(found)
-
-
-Search = Callable[[ImagePyramid, DetectorSettings, DotFamily, np.ndarray], Dots]
-"""From an image, and the frames of known targets, shape (k, 3, 3), to where discs may be."""
-
-SEARCHES: tuple[Search, ...] = (whole_discs, voted_discs, small_discs)
-"""The ways to look for discs, the fastest first."""
 
 
 def _outlines(known: np.ndarray, code: DotFamily, margin: float | np.ndarray) -> np.ndarray:

@@ -44,7 +44,7 @@ from ahf_ros.features.dot_search import voted_dots, whole_dots
 from ahf_ros.features.dots import Dots, distinct
 from ahf_ros.features.ellipse_targets import ellipse_fields, targets_from_frames
 from ahf_ros.features.homography import local_frames
-from ahf_ros.features.large_targets import Identify, targets_of_octaves
+from ahf_ros.features.large_targets import targets_of_octaves
 from ahf_ros.features.pyramid import ImagePyramid, Octave, image_pyramid
 from ahf_ros.features.small_dots import small_dots_in
 from ahf_ros.imaging.image import as_gray, check_image
@@ -76,16 +76,7 @@ class GsiDetector(FamilyDetector):
     @one_blas_thread()
     def search(self, pyramid: ImagePyramid) -> list[Target]:
         """Identify the targets of one image; see `Searching`."""
-        return self._searched(pyramid, self._identify)
-
-    @one_blas_thread()
-    def glance(self, pyramid: ImagePyramid) -> list[Target]:
-        """Identify obvious targets, whose dots have whole outlines; see `Glancing`."""
-        return self._searched(pyramid, self._obvious)
-
-    def _searched(self, pyramid: ImagePyramid, identify: Identify) -> list[Target]:
-        """Return the targets of all octaves, in the order of their IDs."""
-        found = targets_of_octaves(pyramid, self.settings.radii, identify, self.refine)
+        found = targets_of_octaves(pyramid, self.settings.radii, self._identify, self.refine)
         single = [target for target in found if target.id == UNDECODED]
         decoded = [target for target in found if target.id != UNDECODED]
         return sorted_targets([*best_targets(decoded), *single])
@@ -100,12 +91,6 @@ class GsiDetector(FamilyDetector):
         if settings.report_undecoded:
             targets += uncoded(octave.pyramid.gray, dots, targets, settings)
         return targets
-
-    def _obvious(self, octave: Octave) -> list[Target]:
-        """Return the obvious targets of an octave, in its pixels."""
-        code, kind = self.design, (*octave.radii, self.settings.polarities)
-        _, certain = obvious_targets(octave.pyramid, kind, code)
-        return report(certain, code) if len(certain.words) else []
 
     @one_blas_thread()
     def refine(self, image: np.ndarray, targets: Sequence[Target]) -> list[Target]:
@@ -141,7 +126,10 @@ def find_hypotheses(
     Dots whose outlines are whole cost little. Where they make obvious targets, no others are
     looked for.
     """
-    whole, certain = obvious_targets(pyramid, (*settings.radii, settings.polarities), code)
+    kind = (*settings.radii, settings.polarities)
+    whole = resized(pyramid.gray, whole_dots(pyramid, *kind))
+    first = read_targets(pyramid, whole, code, NO_HYPOTHESES, obvious=True)
+    certain = first.select(resolve(first, code, OBVIOUS))
     places, radii = _printed(certain.words, code, certain.scale)
     rest, explained = np.ones(len(whole.frames), bool), []
     for frames in dot_frames(certain.homographies, places, (1 + _MARGIN) * radii):
@@ -150,15 +138,6 @@ def find_hypotheses(
         explained.append(cv2.convexHull(corners.astype(np.float32))[:, 0])
     dots = resized(pyramid.gray, _with_others(pyramid, whole.select(rest), settings, explained))
     return read_targets(pyramid, dots, code, certain, obvious=False), dots
-
-
-def obvious_targets(
-    pyramid: ImagePyramid, kind: tuple[float, float, Sequence[int]], code: PointFamily
-) -> tuple[Dots, Hypotheses]:
-    """Return the dots with a whole outline, of radii and polarities, and the targets they make."""
-    whole = resized(pyramid.gray, whole_dots(pyramid, *kind))
-    first = read_targets(pyramid, whole, code, NO_HYPOTHESES, obvious=True)
-    return whole, first.select(resolve(first, code, OBVIOUS))
 
 
 def _with_others(
