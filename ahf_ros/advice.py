@@ -13,7 +13,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
-from functools import partial
+from itertools import islice
 from math import ceil
 from statistics import median
 
@@ -75,23 +75,39 @@ def advice(image: np.ndarray, settings: DetectorSettings, expected_targets: int 
     >>> advice(render(scene).image, DetectorSettings(family='metashape12'))
     ['3 targets of aicon14: --family aicon14']
     """
-    check_image(image)
-    part = _with_most_dots(as_gray(image), _MAXIMUM_PIXELS, settings)
-    return list(filter(None, _lines(part, settings, expected_targets)))
+    return _advice(_part(image, settings), settings, expected_targets)
 
 
-def advice_together(
-    images: Iterable[np.ndarray], settings: DetectorSettings, expected_targets: int = 0
+def advice_on_all(
+    images: Iterable[tuple[str, np.ndarray]], settings: DetectorSettings, expected_targets: int = 0
 ) -> list[str]:
-    """Return lines on the rings that gray images show together in which nothing was identified.
+    """Return lines on gray images in which nothing was identified, each of which has a name.
 
-    A few rings in each of several images may tell their family where those of one do not. Images
-    of many dots, as of texture, do not count. The arguments are as for `advice`.
+    They are on the first of `LOOKED_AT` images that says something; else on the rings that up to
+    `TOGETHER` images show together: a few in each of several may tell their family where those of
+    one do not. Images of many dots, as of texture, do not count. No image is asked for twice. The
+    other arguments are as for `advice`.
     """
-    parts = (_with_most_dots(as_gray(image), _MAXIMUM_PIXELS, settings) for image in images)
-    dots = [of for of in map(partial(dots_in, settings=settings), parts) if _are_few(of)]
-    learnt = _learnt(dots)
-    return list(filter(None, _of_bands(learnt, 1, settings, expected_targets) if learnt else ()))
+    parts: list[np.ndarray] = []
+    for name, image in islice(images, TOGETHER):
+        parts.append(_part(image, settings))
+        if len(parts) <= LOOKED_AT and (lines := _advice(parts[-1], settings, expected_targets)):
+            return [f'{name}: {line}' for line in lines]
+    dots = [of for part in parts if _are_few(of := dots_in(part, settings))]
+    if len(parts) < 2 or not (learnt := _learnt(dots)):
+        return []
+    lines = list(filter(None, _of_bands(learnt, 1, settings, expected_targets)))
+    return [f'{len(parts)} images together: {line}' for line in lines]
+
+
+def _part(image: np.ndarray, settings: DetectorSettings) -> np.ndarray:
+    """Return the part of an image that gets a second look."""
+    check_image(image)
+    return _with_most_dots(as_gray(image), _MAXIMUM_PIXELS, settings)
+
+
+def _advice(part: np.ndarray, settings: DetectorSettings, expected: int) -> list[str]:
+    return list(filter(None, _lines(part, settings, expected)))
 
 
 class Adviser:

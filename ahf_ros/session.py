@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -115,8 +116,9 @@ def _narrowed(
     """Return what identifies the targets of some families; N is estimated where all are rings."""
     used = detector.narrowed(families)
     counted = settings.estimate_expected and used.name == 'ring'
-    some = {'family': ','.join(families), 'estimate_expected': counted}
-    return _identifier(Identifier, used, updated(settings, some), interrupt)
+    detection = settings.detection.narrowed(families)
+    some = replace(settings, detection=detection, estimate_expected=counted)
+    return _identifier(Identifier, used, some, interrupt)
 
 
 def _identifier(

@@ -23,6 +23,7 @@ from ahf_ros.blas import one_blas_thread
 from ahf_ros.deprecation import deprecated_arguments
 from ahf_ros.detectors.evidence import Reading, evidence, is_clear, reading_of
 from ahf_ros.detectors.explained import without_targets
+from ahf_ros.filtering.genetic import Values
 from ahf_ros.filtering.identifier import Identifier, Memory
 from ahf_ros.filtering.trials import DetectorFunction, Trials
 from ahf_ros.imaging.stack import ImageStack
@@ -41,6 +42,7 @@ _OF_KNOWN = 1.99  # ... on families that other images have settled: one certain 
 
 _IN_TURN = 8  # images, at least, over which the looks at all parts of one are spread
 _WHOLE_KINDS = ('ring',), ('aruco', 'apriltag')  # of which a part may show too few
+_READ_BY_NAME = {'aruco', 'apriltag'}  # also where all families have been looked for
 _PART = 480  # side of a part of an image in which other families are looked for, px, at least
 _PARTS = 4  # of an image in a row and in a column, at the most; neighbours share a third
 
@@ -110,6 +112,11 @@ def still_shown(targets: Sequence[Target]) -> bool:
 
 def _families(targets: Iterable[Target]) -> set[str]:
     return {target.family for target in targets if target.id != UNDECODED}
+
+
+def _family(target: Target) -> str:
+    """Return the family of a target, or the likely one where it is not decoded."""
+    return target.likely_family if isinstance(target, UndecodedTarget) else target.family
 
 
 def _parts(image: np.ndarray) -> list[Callable[[], np.ndarray]]:
@@ -271,11 +278,28 @@ class SettlingIdentifier(Identifier):
         self, stack: ImageStack, families: tuple[str, ...], expected: int | None
     ) -> Identification:
         """Return what an image shows of some families, and remember it."""
-        identifier = self._reader(families)
-        identifier.memory = self.memory
-        found = identifier.identify(stack, expected_targets=expected)
-        self.memory, self.last_search = identifier.memory, identifier.last_search
+        reader = self._reader(families)
+        reader.memory = self.memory
+        trials = reader._trials(stack)
+        for values, seen in self._read_already(families):
+            trials.know(values, seen)
+        found = reader._identified(stack, trials, expected)
+        self.memory, self.last_search = reader.memory, reader.last_search
         return found
+
+    def _read_already(
+        self, families: tuple[str, ...]
+    ) -> Iterator[tuple[Values | None, list[Target]]]:
+        """Yield what a look has read of families beyond doubt, as they are read by their names.
+
+        The odds of square markers depend on how many dictionaries are looked for.
+        """
+        if self._contested or {self._kinds[name] for name in families} & _READ_BY_NAME:
+            return
+        for values, seen in self._looked.found.items() if self._looked else ():
+            own = [it for it in seen if _family(it) in families]
+            if _families(own) == {*families} and is_clear(own):
+                yield values, own
 
     def _reader(self, families: tuple[str, ...]) -> Identifier:
         """Return what identifies targets of some families, the same one each time."""

@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 import pytest
 
-from ahf_ros.advice import IN_A_ROW, Adviser, advice, advice_together
+from ahf_ros.advice import IN_A_ROW, Adviser, advice, advice_on_all
 from ahf_ros.codes.ring import ring_family
 from ahf_ros.detectors import DetectorSettings
 from ahf_ros.interchange.image_files import write_image
@@ -217,9 +217,15 @@ def test_a_few_rings_in_each_of_several_images_are_told_together(tmp_path, capsy
     assert [line for image in images for line in advice(image, DetectorSettings())] == []
     line = '24 dots with a band of 9 sectors that no known family has: `ahf learn-family`'
     line += ' describes it'
-    assert advice_together(images, DetectorSettings()) == [line]
-    assert advice_together(images[:1], DetectorSettings()) == []
-    assert advice_together([texture(), spots(30, 22, 11)], DetectorSettings()) == []
+    named = [(f'{number}.png', image) for number, image in enumerate(images)]
+    together = f'6 images together: {line}'
+    assert advice_on_all(iter(named), DetectorSettings()) == [together]  # each is read once
+    assert advice_on_all(named[:1], DetectorSettings()) == []
+    ten = ('ten.png', shown(family='cct10'))
+    (first,) = advice_on_all([*named[:2], ten, *named], DetectorSettings(family='metashape12'))
+    assert first == 'ten.png: 12 dots with a band of 10 sectors: --family cct10'
+    busy = [('a.png', texture()), ('b.png', spots(30, 22, 11))]
+    assert advice_on_all(busy, DetectorSettings()) == []
     for number, image in enumerate(images):
         write_image(tmp_path / f'{number}.png', image)
     (tmp_path / '3b.png').write_bytes(b'broken')

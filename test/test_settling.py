@@ -126,8 +126,10 @@ def test_a_clear_image_settles_its_family_at_once_and_later_ones_cost_less(
     assert (found[0].looked_for, found[0].count) == ('auto', 12)
     assert (identifier.memory.families, identifier.memory.shown) == (('metashape12',), FIRST)
     later = calls_of(lambda: identifier.identify(image))
-    assert later < 0.7 * first
-    assert later < 3 * calls_of(lambda: named.identify(image))
+    by_name = calls_of(lambda: named.identify(image))
+    assert first < (2.2 if light == 'normal' else 3.6) * by_name
+    assert later < 2.6 * by_name
+    assert found[0].targets == named.identify(image).targets
     assert identifier.identify(image).targets == named.identify(image).targets
 
 

@@ -211,24 +211,19 @@ def _hint(settings: IdentificationSettings, identified: int) -> list[str]:
 
 def _advice(paths: Sequence[str], settings: IdentificationSettings) -> list[str]:
     """Return lines on the first image in which nothing was identified that says why, or on all."""
-    from ahf_ros.advice import LOOKED_AT, TOGETHER, advice, advice_together
+    from ahf_ros.advice import advice_on_all
     from ahf_ros.imaging.image import check_image
     from ahf_ros.interchange.image_files import read_image
 
-    def images(of: Sequence[str]) -> Iterator[tuple[str, np.ndarray]]:
-        for path in of:
+    def images() -> Iterator[tuple[str, np.ndarray]]:
+        for path in paths:
             with suppress(ValueError):  # which the identification has said
                 image = read_image(path)
                 check_image(image)
                 yield path, image
 
     wanted = settings.detection, settings.number or int(settings.estimate_expected)
-    for path, image in images(paths[:LOOKED_AT]):
-        if lines := advice(image, *wanted):
-            return [f'{path}: {line}' for line in lines]
-    some = paths[:TOGETHER] if len(paths) > 1 else ()
-    lines = advice_together((image for _, image in images(some)), *wanted)
-    return [f'{len(some)} images together: {line}' for line in lines]
+    return advice_on_all(images(), *wanted)
 
 
 def _tasks(

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 
@@ -114,6 +115,7 @@ def proportions(name: str, file: str = '') -> Proportions:
     return Proportions(reach, radius, quiet_zone, radii, pinhole, polarity)
 
 
+@cache
 def relative_reach(name: str) -> float:
     """Return the radius of a target, in semi-axes of the ellipse that is reported.
 

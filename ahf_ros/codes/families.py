@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Container, Iterable, Sequence
 from contextlib import suppress
 from difflib import get_close_matches
+from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
@@ -70,6 +71,10 @@ def families_in(text: str, files: str = '') -> tuple[str, ...]:
     >>> families_in('auto') == FAMILY_NAMES
     True
     """
+    return _families_in(text, files) if files else _usual_families_in(text)
+
+
+def _families_in(text: str, files: str) -> tuple[str, ...]:
     kinds = {name: kind for kind, of_kind in KINDS.items() for name in of_kind}
     given = [part.strip() for part in text.split(',')]
     own: dict[str, str] = {}
@@ -94,6 +99,11 @@ def families_in(text: str, files: str = '') -> tuple[str, ...]:
         if sum(name in (it, own.get(it)) for it in names) > 1:
             raise ValueError(f'{shown}, which names {name} twice, accepted is each family once')
     return names
+
+
+@lru_cache(maxsize=256)
+def _usual_families_in(text: str) -> tuple[str, ...]:
+    return _families_in(text, '')
 
 
 def _usual_name(name: str, kinds: Container[str]) -> str:

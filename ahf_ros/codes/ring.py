@@ -11,8 +11,9 @@ Each family is a data file: see docs/ring_targets.md.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache, lru_cache
+from functools import cache
 from math import gcd
 from typing import Any, ClassVar
 
@@ -292,8 +293,7 @@ def sectors(word: int, bits: int) -> np.ndarray:
     return (word >> np.arange(bits) & 1).astype(bool)
 
 
-@lru_cache(maxsize=100_000)
-def words_of_print(code: Family, word: int, families: tuple[Family, ...]) -> dict[Family, int]:
+def words_of_print(code: Family, word: int, families: Sequence[Family]) -> dict[Family, int]:
     """Return the canonical words of those of some families whose targets have the print of a word.
 
     A word all of whose runs are a multiple of some angle may be a word of other numbers of
@@ -307,16 +307,26 @@ def words_of_print(code: Family, word: int, families: tuple[Family, ...]) -> dic
     >>> list(words_of_print(one, 455, (one, other)).values())
     [455, 3855]
     """
-    inked = sectors(word, code.bits)
-    edges = np.flatnonzero(inked != np.roll(inked, 1))
-    widest = gcd(code.bits, *np.diff(edges).tolist())
-    blocks = np.roll(inked, -edges[0])[::widest]  # the print in as few sectors as show it
-    words = {}
-    for other in families:
-        times, rest = divmod(other.bits, len(blocks))
-        if rest or (other.band, other.circles) != (code.band, code.circles):
-            continue
-        spread = int(np.repeat(blocks, times) @ (1 << np.arange(other.bits)))
-        if other.number(spread):
-            words[other] = int(other.canonical(spread))
-    return words
+    return words_of_prints(code, np.array([word]), families)[0]
+
+
+def words_of_prints(
+    code: Family, words: np.ndarray, families: Sequence[Family]
+) -> list[dict[Family, int]]:
+    """Return the same for each of k words, ndarray of int, shape (k,)."""
+    same = (code.band, code.circles)
+    alike = [other for other in families if (other.band, other.circles) == same]
+    inked = code.canonical(words)[:, None] >> np.arange(code.bits) & 1  # a run begins at sector 0
+    spread = {}
+    for bits in {other.bits for other in alike}:
+        blocks = inked.reshape(len(words), gcd(bits, code.bits), -1)
+        whole = (blocks == blocks[..., :1]).all(axis=(1, 2))
+        repeated = np.repeat(blocks[..., 0], bits // blocks.shape[1], axis=1)
+        canonical = smallest_rotation(repeated @ (1 << np.arange(bits)), bits)
+        spread[bits] = np.where(whole, canonical, 0)
+    found: list[dict[Family, int]] = [{} for _ in words]
+    for other in alike:
+        of_print = spread[other.bits]
+        for index in np.flatnonzero(np.isin(of_print, other.words)).tolist():
+            found[index][other] = int(of_print[index])
+    return found

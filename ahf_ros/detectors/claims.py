@@ -55,19 +55,20 @@ def leading(
 
 
 def best_targets(targets: Sequence[_Target], reach: float = 0.0) -> list[_Target]:
-    """Return the most certain target of each place and each ID of a family, decoded ones first.
+    """Return the most certain target of each place and each print, decoded ones first.
 
-    No other lies in the reach of a target, in radii of its dot. Where it is 0 only IDs count.
+    A print is an ID of a family in one polarity, see `Target.print`. No other lies in the reach of
+    a target, in radii of its dot. Where that is 0 only prints count.
     """
     order = sorted(targets, key=lambda it: (it.id == UNDECODED, -it.confidence, it.y, it.x))
     x, y, minor = np.array([(it.x, it.y, it.semi_minor) for it in order]).reshape(-1, 3).T
-    ids, radii = np.array([it.id for it in order]), reach * minor
-    families = np.array([it.family for it in order])
+    radii, decoded = reach * minor, np.array([it.id != UNDECODED for it in order], bool)
+    prints: dict[tuple[str, int, int], int] = {}
+    of_print = np.array([prints.setdefault(it.print, len(prints)) for it in order], int)
 
     def rivals(index: int) -> np.ndarray:
         near = np.hypot(x - x[index], y - y[index]) < np.minimum(radii, radii[index])
-        same = (ids == ids[index]) & (families == families[index])
-        return near | same & (ids != UNDECODED)
+        return near | decoded & (of_print == of_print[index])
 
     owning = owners(len(order), rivals)
     return [target for target, owns in zip(order, owning, strict=True) if owns]

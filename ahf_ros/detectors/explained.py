@@ -41,19 +41,20 @@ def without_targets(image: np.ndarray, targets: Iterable[Target]) -> np.ndarray:
     left = image.copy()
     height, width = image.shape
     angles = np.arange(_ANGLES) * 2 * np.pi / _ANGLES
-    for target in targets:
-        (frame,) = affine_frames(*np.atleast_2d([target.x, target.y, *_reach(target)]).T)
-        rim = np.column_stack([np.cos(angles), np.sin(angles), np.ones(_ANGLES)]) @ frame.T
-        x, y = np.rint(rim[:, :2].T).astype(int)
-        about = image[y.clip(0, height - 1), x.clip(0, width - 1)].astype(float)
-        rows = slice(max(y.min(), 0), max(y.max() + 1, 0))
-        columns = slice(max(x.min(), 0), max(x.max() + 1, 0))
-        part = left[rows, columns]
+    ellipses = np.array([(it.x, it.y, *_reach(it)) for it in targets]).reshape(-1, 5)
+    frames = affine_frames(*ellipses.T)
+    circle = np.stack([np.cos(angles), np.sin(angles), np.ones(_ANGLES)])
+    rims = np.rint((frames @ circle)[:, :2]).astype(int)
+    x, y = rims.swapaxes(0, 1)
+    every = image[y.clip(0, height - 1), x.clip(0, width - 1)].astype(float)
+    low, high = (it.clip(0).tolist() for it in (rims.min(axis=2), rims.max(axis=2) + 1))
+    columns = zip(low, high, every, np.median(every, axis=1), np.linalg.inv(frames), strict=True)
+    for (first, top), (end, bottom), about, middle, inverse in columns:
+        part = left[top:bottom, first:end]
         if not part.size:
             continue
-        inverse = np.linalg.inv(frame)
-        down, right = np.ogrid[rows, columns][:2]
-        down, right = down[: len(part)], right[:, : part.shape[1]]
+        right = np.arange(first, first + part.shape[1])
+        down = np.arange(top, top + len(part))[:, None]
         across, along = (
             inverse[row, 0] * right + inverse[row, 1] * down + inverse[row, 2] for row in (0, 1)
         )
@@ -61,7 +62,6 @@ def without_targets(image: np.ndarray, targets: Iterable[Target]) -> np.ndarray:
         inside = outwards < 1
         turn = np.arctan2(along, across)[inside] % (2 * np.pi)
         rim_values = np.interp(turn, angles, about, period=2 * np.pi)
-        middle = np.median(about)
         painted = middle + outwards[inside] * (rim_values - middle)
         part[inside] = painted.astype(image.dtype) if image.dtype.kind == 'f' else np.rint(painted)
     return left

@@ -3,7 +3,8 @@
 What a detector takes for a target may be a part of another one: the dot of a ring may be one dot
 of many. A place belongs to one target, the surer one, of equally sure ones the larger. Where all
 families are looked for and one detector finds targets of its own beyond doubt, the next ones look
-at an image in which these are painted over, which takes them a fraction of the time.
+at an image in which these are painted over, which takes them a fraction of the time; those that
+search for dots do not where no outline of a circle is left.
 """
 
 from __future__ import annotations
@@ -31,10 +32,12 @@ from ahf_ros.detectors.contract import (
 from ahf_ros.detectors.evidence import is_clear
 from ahf_ros.detectors.explained import without_targets
 from ahf_ros.features.common_search import CommonSearch
+from ahf_ros.features.dot_search import whole_outlines
 from ahf_ros.features.pyramid import ImagePyramid, image_pyramid
 from ahf_ros.imaging.image import as_gray, check_image
 from ahf_ros.target import UNDECODED, DottedTarget, Target, sorted_targets
 
+_SMALLEST = 1.0  # radius of an outline in a half of the image that any detector looks for, px
 _DIGITS = 2  # of a confidence, beyond which one is not surer than another
 
 
@@ -110,10 +113,11 @@ class SeveralDetector:
         """Return the targets of each detector; those that search for dots do so together."""
         check_image(image)
         searching = sum(isinstance(it, Searching) for it in self.parts) > 1
-        left, pyramid = image, self._pyramid(image) if searching else None
+        left, pyramid, outlined = image, self._pyramid(image) if searching else None, True
         results: list[list[Target]] = []
         for part in self.parts:
-            if left.min() == left.max():  # all that there was is painted over
+            passed = not outlined and isinstance(part, Searching)
+            if passed or left.min() == left.max():  # all that there was is painted over
                 results.append([])
             elif pyramid and isinstance(part, Searching):
                 results.append(part.search(pyramid))
@@ -122,6 +126,7 @@ class SeveralDetector:
             if self.family == AUTO and is_clear(results[-1]):
                 left = without_targets(left, [it for it in results[-1] if it.id != UNDECODED])
                 pyramid = self._pyramid(left) if searching else None
+                outlined = self.settings.report_undecoded or not pyramid or has_outlines(pyramid)
         return results
 
     def _pyramid(self, image: np.ndarray) -> ImagePyramid:
@@ -165,6 +170,15 @@ class SeveralDetector:
         for target in found:
             known = target.id == UNDECODED or target.family in families
             yield target if known else replace(target, family=families[0])
+
+
+def has_outlines(pyramid: ImagePyramid) -> bool:
+    """Return whether an image has whole outlines of circles of any size.
+
+    Where targets are painted over that leave no doubt, light shows others by some at the least.
+    """
+    sizes = _SMALLEST, max(pyramid.gray.shape)
+    return any(len(whole_outlines(edges, *sizes).frames) for edges in pyramid.edges)
 
 
 def _radius(target: Target) -> float:

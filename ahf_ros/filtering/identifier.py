@@ -252,15 +252,20 @@ class Identifier:
         Exception
             Whatever the detector, the refinement or the estimate raises.
         """
-        started = self._clock()
         stack = image if isinstance(image, ImageStack) else ImageStack((image,))
+        return self._identified(stack, self._trials(stack), expected_targets)
+
+    def _identified(
+        self, stack: ImageStack, trials: Trials, expected_targets: int | None
+    ) -> Identification:
+        """Return what an image or stack shows, of which something may be known already."""
+        started = self._clock()
         given = self._expected_targets if expected_targets is None else expected_targets
         _check_count('expected_targets', given)
         settings = self._settings
         listed = settings.listed
         expected = len(listed) or given
         estimating = not expected and self._estimate is not None
-        trials = self._trials(stack)
         threads = settings.threads or os.cpu_count() or 1
         with ThreadPoolExecutor(threads) if threads > 1 else nullcontext() as executor:
             choice = self._steady(trials, executor) if estimating else None

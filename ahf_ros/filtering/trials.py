@@ -115,13 +115,17 @@ class Trials:
     def count(self, values: Values | None, executor: Executor | None = None) -> int:
         """Return n through a filter; the threads of the executor share the image's strips."""
         if values not in self.targets:
-            self.found[values] = checked_targets(self._detected(values, executor), self._name)
-            self.targets[values] = [
-                target
-                for target in self.found[values]
-                if not self._listed or target.id in self._listed or target.id == UNDECODED
-            ]
+            self.know(values, checked_targets(self._detected(values, executor), self._name))
         return count_codes(self.targets[values])
+
+    def know(self, values: Values | None, found: list[Target]) -> None:
+        """Note what a filter shows."""
+        self.found[values] = found
+        self.targets[values] = [
+            target
+            for target in found
+            if not self._listed or target.id in self._listed or target.id == UNDECODED
+        ]
 
     def left_out(self, values: Values | None) -> tuple[int, ...]:
         """Return the IDs that a filter showed and that are not expected."""

@@ -10,8 +10,7 @@ import numpy as np
 
 from ahf_ros.target import FilterState, Identification, Target
 
-_NOT_SENT = 'edge_shift', 'polarity'
-_TARGET_FIELDS = [it.name for it in fields(Target) if it.name not in _NOT_SENT]
+_TARGET_FIELDS = [it.name for it in fields(Target) if it.name != 'edge_shift']  # not sent
 
 
 class MessageTypes(Protocol):

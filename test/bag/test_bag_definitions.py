@@ -11,7 +11,10 @@ from ahf_ros.target import UNDECODED, FilterState, Identification, Target
 FOUND = Identification(
     (
         Target(UNDECODED, 0, -0.25, 1e-9, 4.3, 4.1, -1.5, 0.3),
-        Target(516, 2**20 - 1, 3983.123456789, 2655.5, 20.1, 19.7, 0.2, 1.0, (1e-4, 0, 0, 4e-4)),
+        Target(
+            *(516, 2**20 - 1, 3983.123456789, 2655.5, 20.1, 19.7, 0.2, 1.0, (1e-4, 0, 0, 4e-4)),
+            polarity=-1,
+        ),
     ),
     54,
     FilterState(True, 2.7, 0.13, 1700.3, 2.2, 200, 12, 3.1),
@@ -33,6 +36,7 @@ def test_a_message_comes_back_as_it_was() -> None:
     assert (message.width, message.height, message.family) == (3984, 2656, 'aicon12')
     assert [it.id for it in message.targets] == [UNDECODED, 516]
     assert message.targets[1].x == 3983.123456789
+    assert [it.polarity for it in message.targets] == [0, -1]
     assert message.targets[1].covariance.tolist() == [1e-4, 0.0, 0.0, 4e-4]
     assert message.filter.gamma_high == pytest.approx(2.7, abs=1e-6)
     assert message.edge_shift == -0.75

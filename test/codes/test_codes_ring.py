@@ -17,6 +17,7 @@ from ahf_ros.codes.ring import (
     ring_family,
     sectors,
     words_of_print,
+    words_of_prints,
 )
 
 
@@ -132,8 +133,10 @@ def test_opposite_quarters_are_a_word_of_three_families() -> None:
 
 @pytest.mark.parametrize('name', [name for name in FAMILY_NAMES if name != 'metashape20'])
 def test_all_other_words_are_prints_of_their_own(name: str) -> None:
-    words = family(name).words.tolist()
-    shared = [word for word in words if words_by_name(name, word) != {name: word}]
+    code, families = family(name), tuple(map(family, FAMILY_NAMES))
+    prints = words_of_prints(code, code.words, families)
+    words = code.words.tolist()
+    shared = [word for word, of in zip(words, prints, strict=True) if of != {code: word}]
     assert shared == {'metashape12': [455], 'metashape16': [3855]}.get(name, [])
 
 

@@ -1,4 +1,4 @@
-"""Rings of one family and ID, dark ones and bright ones."""
+"""Targets of one family and ID, dark ones and bright ones."""
 
 from __future__ import annotations
 
@@ -11,6 +11,18 @@ from ahf_ros.interchange.export.survey import MeasuredImage, make_survey
 from ahf_ros.session import identify
 from ahf_ros.synthetic.scene import SceneSettings
 from support.scenes import rendered
+
+
+@pytest.mark.parametrize(('family', 'dot_radius'), [('gsi', 4), ('dots', 8), ('cctag3', 24)])
+def test_every_kind_keeps_both_colours_of_an_id(family: str, dot_radius: float) -> None:
+    usual = dict(width=360, height=300, targets=2, seed=3, family=family, dot_radius=dot_radius)
+    of = [rendered(SceneSettings(**usual, polarity=it)) for it in ('dark', 'bright')]
+    found = identify(np.hstack([it.image for it in of]), family=family)
+    assert len(found) == found.count == 4
+    for sign, shown in zip((1, -1), of, strict=True):
+        assert sorted(it.id for it in found if it.polarity == sign) == sorted(
+            it.id for it in shown.targets
+        )
 
 
 @pytest.mark.parametrize('family', ['metashape12', 'cct14', 'auto'])

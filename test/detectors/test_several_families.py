@@ -245,3 +245,10 @@ def test_a_lone_target_is_read_among_two_families_as_by_its_own(light: str, radi
         )
         assert [it.key for it in found] == [it.key for it in named]
         assert [it.id for it in named] == [it.id for it in shown.targets]
+
+
+def test_targets_that_are_few_among_the_spots_of_a_lattice_tell_their_family() -> None:
+    settings = SceneSettings(width=640, height=480, targets=4, dot_radius=12, seed=22)
+    shown = rendered(replace(settings, light='dense_lattice', ambient=0.06))
+    keys = [it.key for it in identified(shown.image, family='auto')]
+    assert keys == sorted(('metashape12', it.id) for it in shown.targets)

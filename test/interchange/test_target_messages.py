@@ -17,8 +17,13 @@ COVARIANCE = (1e-4, 0.0, 0.0, 4e-4)
 FOUND = Identification(
     (
         Target(UNDECODED, 0, -0.25, 1e-9, 4.5, 4.25, -1.5, 0.5),
-        Target(
-            516, 2**20 - 1, 3983.123456789, 2655.5, 20.0, 19.5, 0.25, 1.0, COVARIANCE, 'aicon14'
+        *(
+            Target(
+                *(516, 2**20 - 1, 3983.123456789, 2655.5, 20.0, 19.5, 0.25, 1.0, COVARIANCE),
+                'aicon14',
+                polarity=sign,
+            )
+            for sign in (1, -1)
         ),
     ),
     54,

@@ -164,6 +164,15 @@ def test_the_service_answers_one_image(detector: DetectorProcess, message: Image
     assert response.message.startswith(accepted)
 
 
+def test_dark_and_bright_targets_are_told_apart(
+    detector: DetectorProcess, rendering: Rendering
+) -> None:
+    both = np.hstack([rendering.image, 255 - rendering.image])
+    answer = detector.answer(image_message(both, header()))
+    of = {sign: [it.id for it in answer.targets if it.polarity == sign] for sign in (1, -1)}
+    assert of[1] == of[-1] == sorted(it.id for it in rendering.targets)
+
+
 def test_every_parameter_says_what_it_is(graph: Any, detector: DetectorProcess) -> None:
     items = flat_parameters(DetectorNodeSettings)
     described = graph.call(

@@ -138,13 +138,15 @@ class CctagDetector(FamilyDetector):
         """Return the targets of an octave, in its pixels."""
         found = []
         for look in looks:
+            if not len(look.frames):
+                continue
             rings, light = _identified(gray, look)
             rings = _single(_together(rings))
             if not self._shown(rings).any():  # rivals and pixels make none sure without others
                 continue
             rings = _owned(light, rings, look.polarity, look.family)
             rings = contested(gray, rings, look.polarity, look.family)
-            found += self._targets(_single(rings), look.family.name)
+            found += self._targets(_single(rings), look)
         return found
 
     def _shown(self, rings: Aligned) -> np.ndarray:
@@ -153,7 +155,7 @@ class CctagDetector(FamilyDetector):
         shown: np.ndarray = undecoded | (rings.confidence >= _CERTAIN)
         return shown
 
-    def _targets(self, rings: Aligned, family: str) -> list[Target]:
+    def _targets(self, rings: Aligned, look: _Look) -> list[Target]:
         """Return the targets of the readings that are sure enough."""
         rings = rings.select(self._shown(rings))
         decoded = rings.confidence >= _CERTAIN
@@ -161,7 +163,7 @@ class CctagDetector(FamilyDetector):
         certainty = np.where(decoded, rings.confidence, 0.0)
         return targets_from_frames(
             *(rings.frames, rings.covariance, ids, rings.ids, certainty),
-            *(family, rings.edge_shift),
+            *(look.family.name, rings.edge_shift, look.polarity),
         )
 
 
@@ -189,7 +191,10 @@ def _looks(
         for number, (octave, of) in enumerate(zip(of_octaves, _circles(of_octaves), strict=True))
         for dots, largest in ((of, LARGEST), *_common_centres(octave))
     ]
-    frames = likely_rings(Circles.joined(circles), [it.radii for it in of_octaves], kinds)
+    every = Circles.joined(circles)
+    if not len(every.frames):
+        return {octave.level: [] for octave in of_octaves}
+    frames = likely_rings(every, [it.radii for it in of_octaves], kinds)
     images = [it.pyramid.gray for it in of_octaves]
     lights = [of for part in (_FULL, _HALVES) for of in _first_lights(images[part], frames[part])]
     return {

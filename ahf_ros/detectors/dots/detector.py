@@ -88,7 +88,8 @@ class DotsDetector(FamilyDetector):
         low, high = octave.radii
         settings = replace(self.settings, min_radius=low, max_radius=high)
         code = self.design
-        return report(find_rings(octave.pyramid, settings, code), settings, code)
+        rings = find_rings(octave.pyramid, settings, code)
+        return report(rings, settings, code) if len(rings.words) else []
 
 
 def find_rings(pyramid: ImagePyramid, settings: DetectorSettings, code: DotFamily) -> Rings:

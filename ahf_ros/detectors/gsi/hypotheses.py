@@ -150,16 +150,17 @@ def plausible(
 
 
 def resolve(hypotheses: Hypotheses, family: PointFamily, minimum: float = CERTAIN) -> np.ndarray:
-    """Return the indices of the certain hypotheses, of each target and each code the best one.
+    """Return the indices of the certain hypotheses, of each place and each print the best one.
 
-    They have at least the minimum of confidence.
+    A print is a code in one polarity. They have at least the minimum of confidence.
     """
     confidence = hypotheses.confidence
     order = np.argsort(-confidence, kind='stable')
     order = order[confidence[order] >= minimum]
     units = reference_frames(hypotheses.homographies[order], family.reach * _SAME)
-    words, near = hypotheses.words[order], _within_each(units[:, :2, 2], units)
-    return order[owners(len(order), lambda it: near(it) | (words == words[it]))]
+    prints, near = hypotheses.words * hypotheses.polarity, _within_each(units[:, :2, 2], units)
+    prints = prints[order]
+    return order[owners(len(order), lambda it: near(it) | (prints == prints[it]))]
 
 
 def inside(points: np.ndarray, frames: np.ndarray) -> np.ndarray:

@@ -15,13 +15,13 @@ from ahf_ros.codes.ring import Family, words_of_print
 from ahf_ros.detectors.ring.decoding import DOUBT
 from ahf_ros.detectors.ring.families import contested, decoded, present_families
 from ahf_ros.detectors.ring.hypotheses import Hypotheses
-from ahf_ros.detectors.ring.proposals import HOPEFUL, bounds, measure_likely
+from ahf_ros.detectors.ring.proposals import HOPEFUL, Print, bounds, measure_likely
 from ahf_ros.detectors.ring.reading import read_bands
 from ahf_ros.detectors.ring.rivals import has_all
 from ahf_ros.features.circle_fit import ENOUGH, Fit
 
 _CLEAREST = 32  # dots that tell the family of an image
-_OTHERS = 1024  # clearest ones of the others: texture and letters have thousands
+_OTHERS = 2048  # clearest ones of the others: texture and letters have thousands
 _CLEAR = 0.5  # bound of the mean evidence of a reading, which spots of light hardly reach
 _DOUBTED = 0.1  # probability that all words are wrong, below which they show a family
 _ROUGH = (0.0,)  # shifts of edges that are tried to find these, px
@@ -29,7 +29,7 @@ _SAMPLE = 8  # of those that seem to have a print, which are read first
 _LIKELIEST = 16  # dots to have a print, of which none shows that it is not there
 _CONCEIVABLE = 0.1  # confidence of a word of many, from which it may be certain as one of few
 _NEARLY = 0.05  # mean evidence of a reading, by which a print is as good as the best one
-_PRINTS = 3  # the most likely ones, which are tried on the same dots
+_PRINTS = 4  # the most likely ones, which are tried on the same dots
 
 
 def choose_families(gray: np.ndarray, dots: Fit, families: Sequence[Family]) -> list[Family]:
@@ -72,17 +72,7 @@ def _words_shown(
         return []
     dots, mean = dots.select(hopeful), mean[:, hopeful]
     likely = mean > mean.max(axis=0) - _NEARLY
-    of_prints = np.maximum(mean, 0).mean(axis=1)
-    # Whatever has a number of sectors has its multiples as well.
-    for index, (band, bits) in enumerate(prints):
-        if any(
-            of_prints[other] > of_prints[index] - _NEARLY
-            for other, (of_band, fewer) in enumerate(prints)
-            if of_band == band and fewer < bits and bits % fewer == 0
-        ):
-            of_prints[index] -= _NEARLY
-    by_print = np.argsort(-of_prints, kind='stable')[:tried].tolist()
-    for rank, best in enumerate(by_print):
+    for rank, best in enumerate(_likeliest(prints, np.maximum(mean, 0))[:tried]):
         band, bits = prints[best]
         same = [code for code in families if code.band == band and bits % code.bits == 0]
         read: list[Hypotheses] = []
@@ -94,10 +84,31 @@ def _words_shown(
             every = Hypotheses.joined(read)
             if np.prod(1 - every.confidence) < _DOUBTED:
                 return [
-                    words_of_print(code, word, tuple(families))
+                    words_of_print(code, word, families)
                     for code, word in zip(every.families, decoded(every)[1].tolist(), strict=True)
                 ]
     return []
+
+
+def _likeliest(prints: Sequence[Print], mean: np.ndarray) -> list[int]:
+    """Return the indices of prints, the likeliest first, from the bounds of k dots, (prints, k).
+
+    That which all dots may have comes before those that the best two have: where light makes most
+    of the dots, few are of targets, but none has a higher bound.
+    """
+    orders = []
+    for of_prints in (mean.mean(axis=1), np.sort(mean, axis=1)[:, -2:].mean(axis=1)):
+        # Whatever has a number of sectors has its multiples as well.
+        for index, (band, bits) in enumerate(prints):
+            if any(
+                of_prints[other] > of_prints[index] - _NEARLY
+                for other, (of_band, fewer) in enumerate(prints)
+                if of_band == band and fewer < bits and bits % fewer == 0
+            ):
+                of_prints[index] -= _NEARLY
+        orders.append(np.argsort(-of_prints, kind='stable').tolist())
+    of_all, of_best = orders
+    return list(dict.fromkeys([of_all[0], *of_best]))
 
 
 def _read(gray: np.ndarray, dots: Fit, families: Sequence[Family]) -> Hypotheses:

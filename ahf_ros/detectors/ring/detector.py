@@ -192,7 +192,7 @@ def read_pyramid(
     closer look in the end. Dots that were left unread until then are read with these.
     """
     described: Sequence[Family] = settings.codes(Family)
-    families = described
+    families, polarities = described, settings.polarities
     shown = list(families if len(families) == 1 else shown)
     images = (pyramid.gray, *pyramid.halves)
     nothing = Hypotheses.unread(NO_FITS, families[0])
@@ -202,7 +202,7 @@ def read_pyramid(
     for octave in octaves(pyramid, *settings.radii):
         part, fits = octave.pyramid.gray, [NO_FITS]
         for propose in proposals:
-            proposed = propose(octave, settings.polarities, seen.explained)
+            proposed = propose(octave, polarities, seen.explained)
             proposed = with_rims(proposed, families, octave.radii[0])
             dots = measure_dots(part, proposed, covariances=every)
             families = with_measured_bands(part, dots, families)

@@ -7,12 +7,14 @@ are not clear yet.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import chain
 
 import numpy as np
 
-from ahf_ros.codes.ring import Family, canonical, words_of_print
+from ahf_ros.codes.ring import Family, canonical, words_of_prints
 from ahf_ros.detectors.claims import leading
 from ahf_ros.detectors.ring.hypotheses import Hypotheses
 from ahf_ros.detectors.ring.known import NOTHING_KNOWN, Prior
@@ -90,10 +92,11 @@ def settle_same_prints(hypotheses: Hypotheses, families: Sequence[Family]) -> Hy
         return hypotheses
     codes = decoded(hypotheses)[1]
     certain = np.flatnonzero(hypotheses.certain).tolist()
-    prints = {
-        index: words_of_print(hypotheses.families[index], int(codes[index]), tuple(families))
-        for index in certain
-    }
+    prints: dict[int, dict[Family, int]] = {}
+    for code in dict.fromkeys(hypotheses.families[certain]):
+        own = [index for index in certain if hypotheses.families[index] is code]
+        prints |= zip(own, words_of_prints(code, codes[own], families), strict=True)
+    prints = {index: prints[index] for index in certain}
     present, sure = present_families(list(prints.values()))
     options = {
         index: _narrowest({code: word for code, word in words.items() if code in present})
@@ -128,7 +131,7 @@ def present_families(prints: Sequence[dict[Family, int]]) -> tuple[list[Family],
     """
     left, present, sure = list(prints), [], set()
     while left:
-        count = {code: sum(code in of for of in left) for of in left for code in of}
+        count = Counter(chain.from_iterable(left))
         most = max(len(code.words) for code in count)
         best = min(
             count,

@@ -78,6 +78,7 @@ def read(gray: np.ndarray, corners: np.ndarray, groups: Sequence[Sequence[str]])
     A group has dictionaries that begin with the same markers, the smallest first.
     """
     found = [np.zeros((0, 7))]
+    groups = groups if len(corners) else ()
     frames = square_frames(corners)
     bordered = np.flatnonzero(_dark_inside(gray, frames, _DEPTH))
     parallel = parallel_odds(frames, max(gray.shape))
