@@ -50,7 +50,8 @@ def photographs() -> list[Photograph]:
 def targets_of(shown: Photograph) -> list[TrueTarget]:
     """Return the targets of a photograph."""
     counted = [TrueTarget(*it) for it in shown['targets']]
-    return counted + [TrueTarget(*it, False) for it in shown.get('uncounted', ())]
+    others = [TrueTarget(no, x, y, confirmed=False) for no, x, y in shown.get('uncounted', ())]
+    return counted + others
 
 
 def picture(folder: Path, shown: Photograph) -> np.ndarray:
