@@ -1,6 +1,7 @@
 """What may help where no target is identified: only what a second look at the image measures.
 
-It is a look at the part of the image with the most dots, so that its time and memory are bounded.
+It is a look at the part of the image with the most dots, so that its time and memory are bounded,
+and at the whole image reduced to as many pixels where that part says nothing.
 Targets are looked for where the dots are few. Where they are many, as in texture, text and arrays
 of spots, only the bands of the clearest ones are looked at.
 """
@@ -75,7 +76,7 @@ def advice(image: np.ndarray, settings: DetectorSettings, expected_targets: int 
     >>> advice(render(scene).image, DetectorSettings(family='metashape12'))
     ['3 targets of aicon14: --family aicon14']
     """
-    return _advice(_part(image, settings), settings, expected_targets)
+    return _advice(image, _part(image, settings), settings, expected_targets)
 
 
 def advice_on_all(
@@ -91,7 +92,9 @@ def advice_on_all(
     parts: list[np.ndarray] = []
     for name, image in islice(images, TOGETHER):
         parts.append(_part(image, settings))
-        if len(parts) <= LOOKED_AT and (lines := _advice(parts[-1], settings, expected_targets)):
+        if len(parts) > LOOKED_AT:
+            continue
+        if lines := _advice(image, parts[-1], settings, expected_targets):
             return [f'{name}: {line}' for line in lines]
     dots = [of for part in parts if _are_few(of := dots_in(part, settings))]
     if len(parts) < 2 or not (learnt := _learnt(dots)):
@@ -106,8 +109,14 @@ def _part(image: np.ndarray, settings: DetectorSettings) -> np.ndarray:
     return _with_most_dots(as_gray(image), _MAXIMUM_PIXELS, settings)
 
 
-def _advice(part: np.ndarray, settings: DetectorSettings, expected: int) -> list[str]:
-    return list(filter(None, _lines(part, settings, expected)))
+def _advice(
+    image: np.ndarray, part: np.ndarray, settings: DetectorSettings, expected: int
+) -> list[str]:
+    """Return what a part of an image says, or else the whole of it."""
+    lines = list(filter(None, _lines(part, settings, expected)))
+    if not lines and part.size < image.size:
+        lines = list(filter(None, _of_whole(as_gray(image), settings, expected)))
+    return lines
 
 
 class Adviser:
@@ -156,13 +165,8 @@ def _lines(image: np.ndarray, settings: DetectorSettings, expected: int) -> Iter
         target = counted(count, 'target')
         yield f'{target} may be of {name}, too few to be sure: --family {name}'
         return
-    usual = replace(settings, family=AUTO, polarity='auto', min_radius=0.0, max_radius=1e4)
-    others = set(usual.families) - set(settings.families)
-    found = evident(_identified(image, usual)) if others else []
-    if found := [it for it in found if it.family in others]:
-        ((name, count),) = Counter(target.family for target in found).most_common(1)
-        yield f'{counted(count, "target")} of {name}: --family {name}'
-        yield edge_shift_remark(median_edge_shift(found))
+    if others := list(_of_others(image, settings)):
+        yield from others
         return
     if shared := list(_of_shared_prints(image, settings)):
         yield from shared
@@ -175,6 +179,28 @@ def _lines(image: np.ndarray, settings: DetectorSettings, expected: int) -> Iter
     elif small := _identified(middle, replace(settings, max_radius=_largest_told(settings))):
         radius = median(target.semi_major for target in small) / _ENLARGED
         yield _of_size(len(small), radius, settings.narrowed({it.family for it in small}))
+
+
+def _of_whole(gray: np.ndarray, settings: DetectorSettings, expected: int) -> Iterator[str]:
+    """Yield what a reduced image shows: large targets are far from each other."""
+    times = ceil((gray.size / _MAXIMUM_PIXELS) ** 0.5)
+    reduced = cv2.resize(gray, None, fx=1 / times, fy=1 / times, interpolation=cv2.INTER_AREA)
+    dots = dots_in(reduced, DetectorSettings())
+    if learnt := _learnt([dots]):
+        yield from _of_bands(learnt, 1 / times, settings, expected)
+    elif _are_few(dots):
+        yield next(_of_others(reduced, settings), '')  # of edges it tells little
+
+
+def _of_others(image: np.ndarray, settings: DetectorSettings) -> Iterator[str]:
+    """Yield how many targets of a family that was not looked for an image shows, of any size."""
+    usual = replace(settings, family=AUTO, polarity='auto', min_radius=0.0, max_radius=1e4)
+    others = set(usual.families) - set(settings.families)
+    found = evident(_identified(image, usual)) if others else []
+    if found := [it for it in found if it.family in others]:
+        ((name, count),) = Counter(target.family for target in found).most_common(1)
+        yield f'{counted(count, "target")} of {name}: --family {name}'
+        yield edge_shift_remark(median_edge_shift(found))
 
 
 def _likely(read: Sequence[Target]) -> list[Target]:
@@ -219,7 +245,7 @@ def _learnt(images: Iterable[list[DotsOfOctave]]) -> LearntFamily | None:
 
 
 def _of_bands(
-    found: LearntFamily, scale: int, settings: DetectorSettings, expected: int
+    found: LearntFamily, scale: float, settings: DetectorSettings, expected: int
 ) -> Iterator[str]:
     """Yield what dots with bands say, seen in an image that was enlarged by a scale."""
     polarity, count = int(np.median(found.bands.polarity)), len(found.words)
@@ -228,7 +254,7 @@ def _of_bands(
     rings = settings.narrowed(known or FAMILY_NAMES)
     size = _of_size(count, float(np.median(found.bands.size)) / scale, rings)
     edges = edge_shift_remark(found.growth * polarity / scale)
-    exact = scale == 1 and np.median(found.bands.spread) < _EXACT
+    exact = scale <= 1 and np.median(found.bands.spread) < _EXACT
     dots = f'{count} dots with a band of {found.bits} sectors'
     if known and not set(known) & set(settings.families):
         yield f'{dots}: --family {" or ".join(known)}'

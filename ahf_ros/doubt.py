@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from ahf_ros.target import UNDECODED, Target, UndecodedTarget
-from ahf_ros.text import listed
+from ahf_ros.text import counted, listed
 
 DOUBTFUL_BELOW = 0.95
 """Confidence below which a decoded target counts as doubtful."""
@@ -31,6 +31,23 @@ def doubt(target: Target, detector: str) -> str:
     if target.id == UNDECODED or target.confidence >= DOUBTFUL_BELOW:
         return ''
     return _MEANING.get(detector, f'{detector} sets a lower limit of its own')
+
+
+def doubtful_remark(doubts: Mapping[str, int], identified: int) -> str:
+    """Return how many targets are doubtful, why, and what shows them; nothing if there are none.
+
+    `doubts` are the numbers of targets by what `doubt` returns, `identified` is that of all.
+
+    Examples
+    --------
+    >>> doubtful_remark({'how many agree': 2}, 9)
+    '2 of 9 targets are doubtful (how many agree): look at them with --overlay DIR'
+    """
+    if not doubts:
+        return ''
+    why = max(doubts, key=lambda it: doubts[it])
+    of_all = f'{sum(doubts.values())} of {counted(identified, "target")}'
+    return f'{of_all} are doubtful ({why}): look at them with --overlay DIR'
 
 
 def repeated_remark(targets: Sequence[UndecodedTarget]) -> str:

@@ -28,6 +28,12 @@ def shown(**changes: object) -> np.ndarray:
     return rendered(replace(SCENE, **changes)).image
 
 
+def test_large_targets_that_are_far_from_each_other_are_told() -> None:
+    image = shown(width=3000, height=2200, targets=3, dot_radius=60)
+    lines = advice(image, DetectorSettings(family='aicon14'))
+    assert lines == ['3 targets of metashape12: --family metashape12']
+
+
 @pytest.mark.parametrize(
     ('scene', 'looked_for', 'lines'),
     [

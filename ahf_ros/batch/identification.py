@@ -185,10 +185,9 @@ def _lines(found: Identification, detector: str) -> Iterator[Message]:
 
 
 def _remark(target: Target, detector: str) -> str:
-    """Return why a target is doubtful or not decoded, after a comma; nothing for others."""
+    """Return that a target is doubtful, or why it is not decoded; nothing for others."""
     if isinstance(target, UndecodedTarget):
         likely = target.likely_id != UNDECODED
         word = f', likely {target.likely_id} of {target.likely_family}' if likely else ''
         return f', {target.reason}{word}'
-    why = doubt(target, detector)
-    return f', doubtful: {why}' if why else ''
+    return ', doubtful' if doubt(target, detector) else ''

@@ -9,8 +9,10 @@ import argparse
 import json
 import re
 import sys
+from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import closing, redirect_stdout, suppress
+from dataclasses import dataclass, field
 from glob import glob, has_magic
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
@@ -29,6 +31,7 @@ from ahf_ros.cli.options import (
     settings_from,
 )
 from ahf_ros.codes.families import AUTO
+from ahf_ros.doubt import doubtful_remark
 from ahf_ros.interchange.files import RESULTS_FILE, is_url, read_text, urls_named
 from ahf_ros.session_settings import IdentificationSettings, StackSettings
 from ahf_ros.settings.parameter import parameters
@@ -115,13 +118,10 @@ def _run(options: argparse.Namespace, output: TextIO | None) -> int:
     from ahf_ros.batch.settling import settled_tasks
     from ahf_ros.detectors import is_foreign
     from ahf_ros.interchange.export.survey import measured_image
-    from ahf_ros.settling import families_line
 
     failed = bool(problems)
-    results = identified = 0
-    empty: list[str] = []
+    seen = _Seen()
     measured: list[MeasuredImage] = []
-    shown: set[str] = set()
     engine = create_engine(
         'identify',
         identify_images,
@@ -137,27 +137,52 @@ def _run(options: argparse.Namespace, output: TextIO | None) -> int:
                 print_outcome('identify', outcome, output, options.quiet)
                 failed |= outcome.failed
                 for record in outcome.records:
-                    results += 1
-                    found = [it for it in record['targets'] if it['id'] != UNDECODED]
-                    identified += len(found)
-                    empty += [record['image']] * (not found and not record.get('repeated'))
-                    shown.update(it['family'] for it in found)
+                    seen.add(record)
                     if options.export:
                         measured.append(measured_image(record, record['image']))
         except (EngineLost, Unwritable) as error:
             tell('identify', error)
             return 1
-    if results and not options.quiet:
-        if shown and AUTO == settings.detection.family == settings.detector:
-            say(families_line(sorted(shown)))
-        for line in _hint(settings, identified):
+    if not options.quiet:
+        for line in seen.lines(settings, drawn=bool(options.overlay)):
             say(line)
-        if 2 * len(empty) >= results:
-            for line in _advice(empty, settings):
-                say(line)
     if not write_exports('identify', options.export, measured, control, options.quiet):
         failed = True
     return int(failed)
+
+
+@dataclass
+class _Seen:
+    """What the results of a command have in common, which its last lines say."""
+
+    results: int = 0
+    identified: int = 0
+    empty: list[str] = field(default_factory=list)
+    families: set[str] = field(default_factory=set)
+    doubts: Counter[str] = field(default_factory=Counter)
+
+    def add(self, record: dict[str, Any]) -> None:
+        """Take note of the result of an image or a stack."""
+        found = [it for it in record['targets'] if it['id'] != UNDECODED]
+        self.results += 1
+        self.identified += len(found)
+        self.empty += [record['image']] * (not found and not record.get('repeated'))
+        self.families.update(it['family'] for it in found)
+        self.doubts.update(it['doubt'] for it in found if 'doubt' in it)
+
+    def lines(self, settings: IdentificationSettings, *, drawn: bool) -> Iterator[str]:
+        """Yield what there is, and what may help; `drawn` says that overlays show it."""
+        from ahf_ros.settling import families_line
+
+        if not self.results:
+            return
+        if self.families and AUTO == settings.detection.family == settings.detector:
+            yield families_line(sorted(self.families))
+        if self.doubts and not drawn:
+            yield doubtful_remark(self.doubts, self.identified)
+        yield from _hint(settings, self.identified)
+        if 2 * len(self.empty) >= self.results:
+            yield from _advice(self.empty, settings)
 
 
 def check_settings(settings: IdentificationSettings) -> None:

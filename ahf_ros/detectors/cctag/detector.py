@@ -345,11 +345,11 @@ def _alone(frames: np.ndarray, others: np.ndarray) -> np.ndarray:
 def _together(rings: Aligned) -> Aligned:
     """Return the readings, in doubt where most of what may be targets of an image is not read.
 
-    Print and camera are the same for all. Where few readings are certain, they may be unlike what
-    is expected, so that others are wrong.
+    Print and camera are the same for all. Where few readings are likely to be right, they may be
+    unlike what is expected, so that others are wrong.
     """
-    certain = int((rings.confidence >= _TELLING).sum())
-    doubt = max(float(np.log((len(rings.ids) - certain + 1) / (certain + 1))), 0.0)
+    right = float(rings.confidence.sum())
+    doubt = max(float(np.log((len(rings.ids) - right + 1) / (right + 1))), 0.0)
     return replace(rings, unusual=rings.unusual + doubt)
 
 

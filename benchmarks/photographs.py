@@ -1,0 +1,162 @@
+"""Photographs by strangers: targets in public repositories, and how many of them are identified.
+
+`benchmarks/truth/photographs.json` says what they show: the repository, the path and the blob of
+each picture, the IDs of its targets and where they are, as a person reads them in the picture or
+in others of its series. `uncounted` are targets that nobody is asked for: too small for a person,
+cut by the border, or of an ID that two of one colour share. Families that the package does not
+have were learnt from the photographs by `ahf learn-family`, and lie beside. Each picture is read
+from a clone of its repository, and identified by itself, with its family named and with `auto`:
+
+    git clone https://github.com/poxiao2/CCTDecode FOLDER/poxiao2/CCTDecode
+    python -m benchmarks.photographs FOLDER [--repositories poxiao2/CCTDecode ...]
+        [--families named auto] [--output FILE]
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import subprocess
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+
+from ahf_ros import FAMILY_NAMES, identify
+from ahf_ros.codes.families import AUTO
+from ahf_ros.evaluation import RIGHT, judge, score
+from ahf_ros.target import Target, TrueTarget
+from benchmarks import report
+
+TRUTH = Path(__file__).parent / 'truth'
+"""What photographs show, and the families that the package does not have."""
+
+NAMED = 'named'
+WAYS = (NAMED, AUTO)
+"""Ways to say which family a picture shows."""
+
+Photograph = dict[str, Any]
+
+
+def photographs() -> list[Photograph]:
+    """Return what all photographs show."""
+    every: list[Photograph] = json.loads((TRUTH / 'photographs.json').read_text())
+    return every
+
+
+def targets_of(shown: Photograph) -> list[TrueTarget]:
+    """Return the targets of a photograph."""
+    counted = [TrueTarget(*it) for it in shown['targets']]
+    others = [TrueTarget(no, x, y, confirmed=False) for no, x, y in shown.get('uncounted', ())]
+    return counted + others
+
+
+def picture(folder: Path, shown: Photograph) -> np.ndarray:
+    """Return a photograph in gray, from the clone of its repository.
+
+    Raises
+    ------
+    ValueError
+        If there is no clone, or if it does not have this picture.
+    """
+    clone = folder / shown['repository']
+    command = ['git', '-C', str(clone), 'cat-file', 'blob', shown['blob']]
+    git = subprocess.run(command, capture_output=True, check=False)
+    if git.returncode:
+        raise ValueError(
+            f'{clone} has no {shown["path"]} ({shown["blob"]}), accepted is a clone of '
+            f'https://github.com/{shown["repository"]}'
+        )
+    gray = cv2.imdecode(np.frombuffer(git.stdout, np.uint8), cv2.IMREAD_GRAYSCALE)
+    return np.asarray(gray)
+
+
+def identified(image: np.ndarray, family: str) -> Sequence[Target]:
+    """Return the targets of a family of the package, of one that was learnt, or of all."""
+    learnt = family not in (*FAMILY_NAMES, AUTO)
+    file = str(TRUTH / f'{family}.json') if learnt else ''
+    return identify(image, family=family, family_file=file).targets
+
+
+def ways_of(shown: Photograph, ways: Sequence[str]) -> list[str]:
+    """Return the ways in which a photograph can be identified: all know no family that is new."""
+    return [way for way in ways if way == NAMED or shown['family'] in FAMILY_NAMES]
+
+
+def record(image: np.ndarray, shown: Photograph, ways: Sequence[str]) -> dict[str, Any]:
+    """Return the figures of a photograph, and the IDs that were missed, by ways."""
+    truth, figures = targets_of(shown), {}
+    for way in ways_of(shown, ways):
+        seen = identified(image, shown['family'] if way == NAMED else way)
+        of = score(truth, seen)
+        right = {it.target for it in judge(truth, seen) if it.kind == RIGHT}
+        figures[way] = {
+            'right': of.right,
+            'wrong': of.wrong,
+            'false': of.false_positives,
+            'missed': [it.id for it in truth if it.confirmed and it not in right],
+        }
+    named = {key: shown[key] for key in ('repository', 'path', 'family')}
+    return named | {'expected': len(shown['targets']), 'by': figures}
+
+
+def markdown(figures: report.Report) -> str:
+    """Return the report as a table, with the missed IDs of each picture."""
+    ways, rows = figures['ways'], []
+    for of in figures['rows']:
+        where = f'[{of["repository"]}](https://github.com/{of["repository"]}) `{of["path"]}`'
+        counts = [cell for way in ways for cell in _cells(of['by'].get(way))]
+        rows.append((where, of['family'], of['expected'], *counts))
+    head = [name for way in ways for name in (way, 'wrong', 'false', 'missed')]
+    sums = [_total(figures['rows'], way) for way in ways]
+    table = report.table(('picture', 'family', 'N', *head), rows)
+    return '\n'.join([report.machine_text(figures['machine']), '', *table, '', *sums])
+
+
+def _cells(of: dict[str, Any] | None) -> tuple[object, ...]:
+    if of is None:
+        return ('-',) * 4
+    return of['right'], of['wrong'], of['false'], ' '.join(map(str, of['missed']))
+
+
+def _total(rows: Sequence[dict[str, Any]], way: str) -> str:
+    some = [of for of in rows if way in of['by']]
+    right, wrong, false = (
+        sum(of['by'][way][name] for of in some) for name in ('right', 'wrong', 'false')
+    )
+    expected = sum(of['expected'] for of in some)
+    return f'{way}: {right} of {expected} right, {wrong} wrong, {false} false in {len(some)}.'
+
+
+def parser() -> argparse.ArgumentParser:
+    """Return what can be chosen."""
+    known = sorted({shown['repository'] for shown in photographs()})
+    made = report.parser(__doc__, seeds=False)
+    made.add_argument('folder', type=Path, help='with the clones, as owner/name')
+    made.add_argument('--repositories', nargs='+', choices=known, default=known)
+    made.add_argument('--families', nargs='+', choices=WAYS, default=WAYS)
+    return made
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Measure and print."""
+    made = parser()
+    options = made.parse_args(arguments)
+    some = [shown for shown in photographs() if shown['repository'] in options.repositories]
+    rows: list[dict[str, Any]] = []
+    try:
+        for shown in report.progress(some, 'photographs'):
+            image = picture(options.folder, shown)
+            rows.append(record(image, shown, options.families))
+    except ValueError as error:
+        made.error(str(error))
+    figures = {'ways': list(options.families), 'machine': report.machine(), 'rows': rows}
+    report.publish(figures, markdown(figures), options)
+    return 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,65 @@
+"""The benchmark of photographs: its truth is complete, and pictures come from clones."""
+
+from __future__ import annotations
+
+import subprocess
+
+import cv2
+import pytest
+
+from ahf_ros import FAMILY_NAMES, SceneSettings, render
+from ahf_ros.codes.families import numbers_of
+from benchmarks import photographs
+
+
+def test_the_truth_names_pictures_and_families_that_can_be_read():
+    every = photographs.photographs()
+    assert len({shown['blob'] for shown in every}) == len(every) > 40
+    for shown in every:
+        new = shown['family'] not in FAMILY_NAMES
+        file = str(photographs.TRUTH / f'{shown["family"]}.json') if new else ''
+        ids = {target[0] for target in shown['targets']}
+        assert ids <= set(numbers_of(shown['family'], file))
+
+
+@pytest.fixture
+def clone(tmp_path):
+    """A folder with a repository of one picture, and what it shows."""
+    scene = render(SceneSettings(width=480, height=360, targets=3, dot_radius=9))
+    repository = tmp_path / 'somebody' / 'pictures'
+    repository.mkdir(parents=True)
+    cv2.imwrite(str(repository / 'one.png'), scene.image)
+    git = ['git', '-C', str(repository)]
+    subprocess.run([*git, 'init', '-q'], check=True)
+    stored = subprocess.run(
+        [*git, 'hash-object', '-w', 'one.png'], check=True, capture_output=True, text=True
+    )
+    targets = [[it.id, it.x, it.y] for it in scene.targets]
+    return tmp_path, {
+        'repository': 'somebody/pictures',
+        'path': 'one.png',
+        'blob': stored.stdout.strip(),
+        'family': 'metashape12',
+        'targets': targets[:2],
+        'uncounted': targets[2:],
+    }
+
+
+def test_a_picture_is_read_from_its_clone_and_scored(clone):
+    folder, shown = clone
+    image = photographs.picture(folder, shown)
+    record = photographs.record(image, shown, photographs.WAYS)
+    of = {'right': 2, 'wrong': 0, 'false': 0, 'missed': []}
+    assert record['by'] == {'named': of, 'auto': of}
+    moved = {**shown, 'targets': [[shown['targets'][0][0], 5, 5]], 'uncounted': []}
+    by = photographs.record(image, moved, ['named'])['by']['named']
+    assert (by['right'], by['false'], by['missed']) == (0, 3, [moved['targets'][0][0]])
+
+
+def test_a_picture_that_is_not_there_says_what_to_clone(clone, capsys):
+    folder, shown = clone
+    with pytest.raises(ValueError, match=r'no other\.png.*github\.com/somebody/pictures'):
+        photographs.picture(folder, {**shown, 'path': 'other.png', 'blob': '0' * 40})
+    with pytest.raises(SystemExit):
+        photographs.main([str(folder), '--repositories', 'elenasmar99/Coded_targets_recognition'])
+    assert 'clone of https://github.com/elenasmar99' in capsys.readouterr().err
