@@ -10,6 +10,7 @@ import numpy as np
 
 from ahf_ros.blas import one_blas_thread
 from ahf_ros.orientation.adjustment import adjust
+from ahf_ros.orientation.calibration import UNDETERMINED
 from ahf_ros.orientation.datum import Datum
 from ahf_ros.orientation.network import FloatArray, IntArray, Network, once_a_photograph
 from ahf_ros.orientation.planar import principal_axes
@@ -209,7 +210,9 @@ def _doubtful(solution: Solution) -> str | None:
         )
     known = known_calibrations(network)[:, 0]
     for camera in np.unique(network.camera_of[photographs]):
-        if not np.isfinite(known[camera]) and 'f' not in solution.released[camera]:
+        sigma = np.sqrt(solution.camera_covariances[camera][0, 0])
+        focal = start.calibrations[camera, 0]
+        if not np.isfinite(known[camera]) and not 0 < sigma < UNDETERMINED * focal:
             return (
                 f'camera {network.cameras[camera].name}: its focal length cannot be determined '
                 f'from {names}, which look in about the same direction. Give a calibration or a '

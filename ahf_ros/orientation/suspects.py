@@ -1,0 +1,305 @@
+"""Scale bars and control points are tested against the photographs before these believe them.
+
+The photographs alone give points up to a similarity, with their covariance. With misclosures l of
+what is known, their covariance C from both, and A as their change under a similarity,
+
+    P = C^-1 - C^-1 A (A' C^-1 A)^- A' C^-1,    v = P l,    T_i = v_i' P_ii^+ v_i
+
+tests the rows i of one bar or point against all others, and P_ii^+ v_i is what it differs from
+them [1]_. The worst goes first. Where leaving out another one explains nearly as much, as always
+of two, nobody can tell which is wrong: then both get the variance at which they agree, as do all
+where no few are to blame [2]_, and deviations are tested against that of the rest [3]_.
+
+References
+----------
+.. [1] Baarda, A testing procedure for use in geodetic networks, 1968; Förstner & Wrobel,
+   Photogrammetric Computer Vision, Springer 2016, 4.6.4.
+.. [2] Paule & Mandel, Consensus values and weighting factors, J. Res. NBS 87 (1982), 377-385.
+.. [3] Rosner, Percentage points for a generalized ESD many-outlier procedure, Technometrics 25
+   (1983), 165-172.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from ahf_ros.orientation.datum import movements
+from ahf_ros.orientation.deviations import with_unit
+from ahf_ros.orientation.knowledge import Known, of_bars, of_control
+from ahf_ros.orientation.network import FloatArray, IntArray, Network
+from ahf_ros.orientation.solution import Suspect
+from ahf_ros.orientation.testing import BY_CHANCE, special
+
+_DECISIVE = 2 * np.log(20)  # chi-square by which one is to blame rather than another: odds of 20
+_CHECKED = 1e-6  # share of a variance that others must leave for something to be tested
+_RANK = 1e-9  # of eigenvalues, relative to the largest
+_HALVINGS = 60
+
+
+class Examined(NamedTuple):
+    """The network as far as it is believed, suspects, and warnings."""
+
+    network: Network
+    suspects: tuple[Suspect, ...]
+    warnings: tuple[str, ...]
+
+
+class _Tested(NamedTuple):
+    """Statistics of each group, its degrees of freedom, its gap, and both of all together."""
+
+    statistics: FloatArray
+    freedom: IntArray
+    gaps: list[FloatArray]
+    sigmas: list[float]
+    whole: float
+    redundancy: int
+
+
+@dataclass(frozen=True)
+class _Misclosures:
+    """Known minus measured: `gaps` (r,), their change under similarities, and both covariances."""
+
+    names: tuple[str, ...]
+    group: IntArray
+    gaps: FloatArray
+    free: FloatArray
+    given: FloatArray
+    measured: FloatArray
+
+    @classmethod
+    def of(cls, known: Known, points: FloatArray, covariance: FloatArray) -> _Misclosures:
+        """Return what bars and control points have over measured points."""
+        parts = of_bars(known, points), of_control(known, points)
+        rows, gaps, given = (np.concatenate(column) for column in zip(*parts, strict=True))
+        names = [f'scale bar {"-".join(bar.ends)}' for bar in known.bars]
+        names += [f'control point {point.name}' for point in known.control]
+        group = np.r_[np.arange(len(known.bars)), np.repeat(np.arange(len(known.control)), 3)]
+        group[len(known.bars) :] += len(known.bars)
+        free = rows @ movements(points)
+        return cls(tuple(names), group, gaps, free, given, rows @ covariance @ rows.T)
+
+    def tested(self, kept: IntArray, added: FloatArray) -> _Tested:
+        """Return the tests of kept groups, whose variances are larger by `added` (groups,)."""
+        rows = np.isin(self.group, kept)
+        free, gaps, group = self.free[rows], self.gaps[rows], self.group[rows]
+        covariance = self.measured[np.ix_(rows, rows)]
+        covariance = covariance + np.diag(self.given[rows] + added[group])
+        # What similarities change may have any variance: no test sees it (Rao 1973, 4i.4).
+        size = np.trace(covariance) / max(float((free**2).sum()), np.finfo(float).tiny)
+        weight = np.linalg.inv(covariance + size * free @ free.T)
+        normal = free.T @ weight @ free
+        inverse = np.linalg.pinv(normal, rcond=_RANK, hermitian=True)
+        residual = weight - weight @ free @ inverse @ free.T @ weight
+        pulls = residual @ gaps
+        statistics, freedom = np.zeros(len(kept)), np.zeros(len(kept), int)
+        differences, sigmas = [], []
+        for place, number in enumerate(kept):
+            own = group == number
+            sizes, axes = np.linalg.eigh(residual[np.ix_(own, own)])
+            checked = sizes > _CHECKED * np.diag(weight)[own].max()
+            along = axes.T @ pulls[own]
+            difference = axes[:, checked] @ (along[checked] / sizes[checked])
+            statistics[place] = float((along[checked] ** 2 / sizes[checked]).sum())
+            freedom[place] = int(checked.sum())
+            differences.append(difference)
+            length = float(np.linalg.norm(difference))
+            sigmas.append(length / max(float(np.sqrt(statistics[place])), np.finfo(float).tiny))
+        redundancy = int(rows.sum()) - int(np.linalg.matrix_rank(normal, _rank(normal), True))
+        whole = float(gaps @ residual @ gaps)
+        return _Tested(statistics, freedom, differences, sigmas, whole, redundancy)
+
+    def agreeing(self, kept: IntArray, blamed: IntArray) -> float:
+        """Return the standard deviation, beside the given one, at which kept groups agree.
+
+        That of blamed groups grows until the statistic of all is their redundancy.
+        """
+        added = np.zeros(len(self.names))
+        low, high = 0.0, float(np.abs(self.gaps).max()) * 2
+        for _ in range(_HALVINGS):
+            middle = (low + high) / 2
+            added[blamed] = middle**2
+            found = self.tested(kept, added)
+            low, high = (middle, high) if found.whole > found.redundancy else (low, middle)
+        return high
+
+
+def _rank(matrix: FloatArray) -> float:
+    return float(_RANK * np.abs(matrix).max())
+
+
+@dataclass
+class _Findings:
+    """What is left out, what cannot be told apart, and the standard deviation that is added."""
+
+    kept: IntArray
+    suspects: list[Suspect]
+    blamed: IntArray
+    added: float
+
+
+def examined(
+    network: Network, known: Known, points: FloatArray, covariance: FloatArray, keep: bool
+) -> Examined:
+    """Return the network without bars and control points that contradict the photographs.
+
+    Points (n, 3) of the layout and their covariance are of the photographs alone, in about the
+    frame and scale of what is known. Suspects are kept where `keep` says so.
+    """
+    if not known.bars and not known.control:
+        return Examined(network, (), ())
+    closures = _Misclosures.of(known, points, covariance)
+    every = np.arange(len(closures.names))
+    if closures.tested(every, np.zeros(len(every))).redundancy == 0:
+        return Examined(network, (), _unchecked(network, closures.names))
+    found = _search(closures, 0.0)
+    if found is None:  # no few are to blame: how precise are they, if all are alike?
+        found = _search(closures, 1.0) or _all_to_blame(closures)
+    warnings = _words(network, closures, found, keep)
+    if keep:
+        kept = tuple(
+            replace(it, verdict='kept') if it.verdict == 'left out' else it
+            for it in found.suspects
+        )
+        return Examined(network, kept, warnings)
+    return Examined(_believed(network, closures, found), tuple(found.suspects), warnings)
+
+
+def _search(closures: _Misclosures, common: float) -> _Findings | None:
+    """Return the suspects, the worst first, None where half of what is known would be.
+
+    With a `common` variance that is not known, deviations are tested against that of the others.
+    """
+    every = np.arange(len(closures.names))
+    kept, suspects = every, []
+    none = np.array([], int)
+    best: _Findings | None = None
+    while len(suspects) <= (len(every) - 1) // 2:
+        sigma = closures.agreeing(kept, kept) if common else 0.0
+        test = closures.tested(kept, np.full(len(every), sigma**2))
+        chances = _chances(test, bool(common))
+        worst = int(np.argmax(_excess(test, bool(common))))
+        if chances[worst] >= BY_CHANCE:
+            if not common:
+                return _Findings(kept, suspects, none, 0.0)
+            best = _Findings(kept, list(suspects), kept, sigma)
+            break
+        rivals = _rivals(test, worst, bool(common))
+        suspect = Suspect(
+            closures.names[kept[worst]],
+            float(np.linalg.norm(test.gaps[worst])),
+            test.sigmas[worst],
+            min(1.0, float(chances[worst])),
+            'unclear' if rivals else 'left out',
+            tuple(closures.names[kept[it]] for it in rivals),
+        )
+        suspects = [*suspects, suspect]
+        if rivals:
+            blamed = kept[[worst, *rivals]]
+            sigma = closures.agreeing(kept, kept if common else blamed)
+            return _Findings(kept, suspects, kept if common else blamed, sigma)
+        kept = np.delete(kept, worst)
+    return best
+
+
+def _all_to_blame(closures: _Misclosures) -> _Findings:
+    every = np.arange(len(closures.names))
+    return _Findings(every, [], every, closures.agreeing(every, every))
+
+
+def _chances(test: _Tested, common: bool) -> FloatArray:
+    """Return how often chance makes one of all statistics so large."""
+    number = max(int((test.freedom > 0).sum()), 1)
+    freedom = np.maximum(test.freedom, 1)
+    if not common:
+        chances = special().chdtrc(freedom, test.statistics)
+    else:
+        rest = test.redundancy - test.freedom
+        left = np.maximum(test.whole - test.statistics, np.finfo(float).tiny)
+        ratio = test.statistics / freedom / (left / np.maximum(rest, 1))
+        chances = np.where(rest > 0, special().fdtrc(freedom, np.maximum(rest, 1), ratio), 1.0)
+    return np.where(test.freedom > 0, number * chances, 1.0)
+
+
+def _excess(test: _Tested, common: bool) -> FloatArray:
+    """Return twice the log likelihood that each alone explains, less its degrees of freedom."""
+    gain = test.statistics
+    if common:
+        left = np.maximum(test.whole - test.statistics, np.finfo(float).tiny)
+        gain = test.redundancy * np.log(max(test.whole, np.finfo(float).tiny) / left)
+    return np.where(test.freedom > 0, gain - test.freedom, -np.inf)
+
+
+def _rivals(test: _Tested, worst: int, common: bool) -> list[int]:
+    excess = _excess(test, common)
+    near = np.flatnonzero(excess > excess[worst] - _DECISIVE)
+    return [int(it) for it in near if it != worst]
+
+
+def _believed(network: Network, closures: _Misclosures, found: _Findings) -> Network:
+    """Return the network whose suspects are checks, and whose blamed ones have their variance."""
+    left_out = {it.name for it in found.suspects if it.verdict == 'left out'}
+    blamed = {closures.names[it] for it in found.blamed}
+
+    def sigma(name: str) -> float:
+        return found.added if name in blamed else 0.0
+
+    bars = tuple(
+        replace(
+            bar,
+            check=bar.check or name in left_out,
+            sigma=float(np.hypot(bar.sigma, 0 if bar.check else sigma(name))),
+        )
+        for bar, name in ((it, f'scale bar {"-".join(it.ends)}') for it in network.bars)
+    )
+    control = tuple(
+        replace(
+            point,
+            check=point.check or name in left_out,
+            covariance=point.covariance + (0 if point.check else sigma(name) ** 2) * np.eye(3),
+        )
+        for point, name in ((it, f'control point {it.name}') for it in network.control)
+    )
+    return replace(network, bars=bars, control=control)
+
+
+def _words(
+    network: Network, closures: _Misclosures, found: _Findings, keep: bool
+) -> tuple[str, ...]:
+    """Return what was found in words."""
+    unit = network.unit
+    warnings = [
+        f'{" or ".join((it.name, *it.rivals))} is wrong: they contradict each other by '
+        f'{with_unit(it.gap, unit)}, {it.gap / it.sigma:.1f} standard deviations, and nothing '
+        'says which. Measure them again'
+        if it.rivals
+        else f'{it.name} contradicts the rest by {with_unit(it.gap, unit)}, '
+        f'{it.gap / it.sigma:.1f} standard deviations (probability {it.probability:.1g}): '
+        + ('it is used all the same' if keep else 'it is left out')
+        for it in found.suspects
+    ]
+    if len(found.blamed):
+        names = [closures.names[it] for it in found.blamed]
+        given = closures.given[np.isin(closures.group, found.blamed)]
+        told = float(np.sqrt(given.mean()))
+        fits = with_unit(float(np.hypot(told, found.added)), unit)
+        used = 'is used instead' if not keep else 'would fit'
+        what = ', '.join(names) if len(names) < 4 else f'{names[0]} and {len(names) - 1} others'
+        warnings.append(
+            f'{what}: a standard deviation of {with_unit(told, unit)} contradicts the '
+            f'photographs; one of {fits} {used}'
+        )
+    return tuple(warnings)
+
+
+def _unchecked(network: Network, names: tuple[str, ...]) -> tuple[str, ...]:
+    """Return that nothing checks what is known, unless there are checks."""
+    if any(it.check for it in network.bars) or any(it.check for it in network.control):
+        return ()
+    verb = 'is' if len(names) == 1 else 'are'
+    return (
+        f'{", ".join(names)} {verb} believed: nothing checks {"it" if verb == "is" else "them"}. '
+        'Give another scale bar or control point',
+    )
