@@ -191,7 +191,7 @@ def _tested(model: _Model, start: Start, datum: Datum, keep_suspects: bool) -> S
     points = state.points[rows]
     movement = similarity_between(images.state.points[rows], points)
     covariance = movement.turned(factor * images.precision.rest[: points.size, : points.size])
-    known = gathered(network, images.layout, first)
+    known = gathered(network, images.layout, first, checks=True)
     checked = examined(network, known, points, covariance, keep_suspects)
     state, datum, _ = placed(checked.network, images.state, datum)
     seen = network.observations

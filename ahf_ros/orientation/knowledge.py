@@ -48,20 +48,30 @@ class Known:
 
 
 def gathered(
-    network: Network, layout: Layout, datum: Datum, lenses: FloatArray | None = None
+    network: Network,
+    layout: Layout,
+    datum: Datum,
+    lenses: FloatArray | None = None,
+    *,
+    checks: bool = False,
 ) -> Known:
     """Return what the adjustment of a layout uses of bars and control points in a datum.
 
-    With approximate calibrations, `lenses`, what is usual of them is known as well.
+    With approximate calibrations, `lenses`, what is usual of them is known as well; with
+    `checks`, they are there, too.
     """
     index = {network.targets[target]: place for place, target in enumerate(layout.points)}
     bars = tuple(
-        bar for bar in network.bars if not bar.check and all(end in index for end in bar.ends)
+        bar
+        for bar in network.bars
+        if (checks or not bar.check) and all(end in index for end in bar.ends)
     )
     control: tuple[ControlPoint, ...] = ()
     if kind(network, datum) == 'control':
         control = tuple(
-            point for point in network.control if not point.check and point.name in index
+            point
+            for point in network.control
+            if (checks or not point.check) and point.name in index
         )
     return Known(
         bars,

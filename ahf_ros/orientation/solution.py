@@ -155,6 +155,8 @@ def part(solution: Solution, photographs: Mask, targets: Mask) -> Solution:
     """Return a solution with some of its photographs and targets; cameras stay as they are."""
     start = solution.start
     network, rows = part_of(solution.network, np.flatnonzero(photographs), np.flatnonzero(targets))
+    if not network.bars and not network.control:
+        network = replace(network, unit='')
     entries = np.repeat(targets, 3)
     return replace(
         solution,

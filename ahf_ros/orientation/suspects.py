@@ -21,6 +21,7 @@ References
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -37,6 +38,8 @@ _DECISIVE = 2 * np.log(20)  # chi-square by which one is to blame rather than an
 _CHECKED = 1e-6  # share of a variance that others must leave for something to be tested
 _RANK = 1e-9  # of eigenvalues, relative to the largest
 _HALVINGS = 60
+_LEAST = 1e-12  # probability that is said
+_NONE = np.array([], int)
 
 
 class Examined(NamedTuple):
@@ -145,18 +148,26 @@ def examined(
 ) -> Examined:
     """Return the network without bars and control points that contradict the photographs.
 
-    Points (n, 3) of the layout and their covariance are of the photographs alone, in about the
-    frame and scale of what is known. Suspects are kept where `keep` says so.
+    `known` has those that are used and checks; points (n, 3) of the layout and their covariance
+    are of the photographs alone, in about the frame and scale of what is known. Checks are
+    witnesses where those that are used contradict each other. Suspects are kept where `keep` says
+    so.
     """
-    if not known.bars and not known.control:
-        return Examined(network, (), ())
     closures = _Misclosures.of(known, points, covariance)
-    every = np.arange(len(closures.names))
-    if closures.tested(every, np.zeros(len(every))).redundancy == 0:
-        return Examined(network, (), _unchecked(network, closures.names))
-    found = _search(closures, 0.0)
-    if found is None:  # no few are to blame: how precise are they, if all are alike?
-        found = _search(closures, 1.0) or _all_to_blame(closures)
+    told = [it.check for it in (*known.bars, *known.control)]
+    used = np.flatnonzero(~np.array(told, bool))
+    if not len(used):
+        return Examined(network, (), ())
+    if not closures.tested(used, np.zeros(len(told))).redundancy:
+        return Examined(
+            network, (), _unchecked([closures.names[it] for it in used], not any(told))
+        )
+    found = _found(closures, used)
+    if any(it.rivals for it in found.suspects) and any(told):
+        heard = _found(closures, np.arange(len(told)))
+        names = {closures.names[it] for it in used}
+        if all(it.name in names and not it.rivals for it in heard.suspects):
+            found = heard
     warnings = _words(network, closures, found, keep)
     if keep:
         kept = tuple(
@@ -167,46 +178,53 @@ def examined(
     return Examined(_believed(network, closures, found), tuple(found.suspects), warnings)
 
 
-def _search(closures: _Misclosures, common: float) -> _Findings | None:
+def _found(closures: _Misclosures, among: IntArray) -> _Findings:
+    """Return who is to blame among groups: few, those whose precision nobody gave, or all."""
+    given = np.bincount(closures.group, closures.given)
+    silent = among[given[among] == 0]
+    found = _search(closures, among, _NONE)
+    if found and (not found.suspects or not len(silent)):
+        return found
+    for common in (silent, among):
+        if len(common) and (found := _search(closures, among, common)):
+            return found
+    return _Findings(among, [], among, closures.agreeing(among, among))
+
+
+def _search(closures: _Misclosures, among: IntArray, common: IntArray) -> _Findings | None:
     """Return the suspects, the worst first, None where half of what is known would be.
 
-    With a `common` variance that is not known, deviations are tested against that of the others.
+    Groups in `common` have a variance beside the given one, at which all agree.
     """
-    every = np.arange(len(closures.names))
-    kept, suspects = every, []
-    none = np.array([], int)
-    best: _Findings | None = None
-    while len(suspects) <= (len(every) - 1) // 2:
-        sigma = closures.agreeing(kept, kept) if common else 0.0
-        test = closures.tested(kept, np.full(len(every), sigma**2))
-        chances = _chances(test, bool(common))
-        worst = int(np.argmax(_excess(test, bool(common))))
+    kept, suspects = among, list[Suspect]()
+    while 2 * len(suspects) < len(among):
+        added = np.zeros(len(closures.names))
+        sigma = closures.agreeing(kept, common) if len(common) else 0.0
+        added[common] = sigma**2
+        test = closures.tested(kept, added)
+        chances, excess = _chances(test, len(common) > 0), _excess(test, len(common) > 0)
+        worst = int(np.argmax(excess))
         if chances[worst] >= BY_CHANCE:
-            if not common:
-                return _Findings(kept, suspects, none, 0.0)
-            best = _Findings(kept, list(suspects), kept, sigma)
-            break
-        rivals = _rivals(test, worst, bool(common))
-        suspect = Suspect(
-            closures.names[kept[worst]],
-            float(np.linalg.norm(test.gaps[worst])),
-            test.sigmas[worst],
-            min(1.0, float(chances[worst])),
-            'unclear' if rivals else 'left out',
-            tuple(closures.names[kept[it]] for it in rivals),
+            fits = not len(common) or test.whole <= 2 * test.redundancy
+            return _Findings(kept, suspects, np.intersect1d(common, kept), sigma) if fits else None
+        near = np.flatnonzero(excess > excess[worst] - _DECISIVE)
+        rivals = [int(it) for it in near if it != worst]
+        gap = float(np.linalg.norm(test.gaps[worst]))
+        suspects.append(
+            Suspect(
+                closures.names[kept[worst]],
+                gap,
+                test.sigmas[worst],
+                float(min(chances[worst], 1.0)),
+                'unclear' if rivals else 'left out',
+                tuple(closures.names[kept[it]] for it in rivals),
+            )
         )
-        suspects = [*suspects, suspect]
         if rivals:
-            blamed = kept[[worst, *rivals]]
-            sigma = closures.agreeing(kept, kept if common else blamed)
-            return _Findings(kept, suspects, kept if common else blamed, sigma)
+            blamed = np.union1d(np.intersect1d(common, kept), kept[[worst, *rivals]])
+            return _Findings(kept, suspects, blamed, closures.agreeing(kept, blamed))
         kept = np.delete(kept, worst)
-    return best
-
-
-def _all_to_blame(closures: _Misclosures) -> _Findings:
-    every = np.arange(len(closures.names))
-    return _Findings(every, [], every, closures.agreeing(every, every))
+    return None
 
 
 def _chances(test: _Tested, common: bool) -> FloatArray:
@@ -230,12 +248,6 @@ def _excess(test: _Tested, common: bool) -> FloatArray:
         left = np.maximum(test.whole - test.statistics, np.finfo(float).tiny)
         gain = test.redundancy * np.log(max(test.whole, np.finfo(float).tiny) / left)
     return np.where(test.freedom > 0, gain - test.freedom, -np.inf)
-
-
-def _rivals(test: _Tested, worst: int, common: bool) -> list[int]:
-    excess = _excess(test, common)
-    near = np.flatnonzero(excess > excess[worst] - _DECISIVE)
-    return [int(it) for it in near if it != worst]
 
 
 def _believed(network: Network, closures: _Misclosures, found: _Findings) -> Network:
@@ -276,7 +288,7 @@ def _words(
         'says which. Measure them again'
         if it.rivals
         else f'{it.name} contradicts the rest by {with_unit(it.gap, unit)}, '
-        f'{it.gap / it.sigma:.1f} standard deviations (probability {it.probability:.1g}): '
+        f'{it.gap / it.sigma:.1f} standard deviations (probability {max(it.probability, _LEAST):.1g}): '
         + ('it is used all the same' if keep else 'it is left out')
         for it in found.suspects
     ]
@@ -294,12 +306,10 @@ def _words(
     return tuple(warnings)
 
 
-def _unchecked(network: Network, names: tuple[str, ...]) -> tuple[str, ...]:
+def _unchecked(names: Sequence[str], alone: bool) -> tuple[str, ...]:
     """Return that nothing checks what is known, unless there are checks."""
-    if any(it.check for it in network.bars) or any(it.check for it in network.control):
-        return ()
-    verb = 'is' if len(names) == 1 else 'are'
-    return (
-        f'{", ".join(names)} {verb} believed: nothing checks {"it" if verb == "is" else "them"}. '
-        'Give another scale bar or control point',
+    them, are = ('it', 'is') if len(names) == 1 else ('them', 'are')
+    text = (
+        f'{", ".join(names)} {are} believed: nothing checks {them}. Give another one, or a check'
     )
+    return (text,) if alone else ()
