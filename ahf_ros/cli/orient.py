@@ -33,6 +33,9 @@ if TYPE_CHECKING:
 
 REPORT_FILE = 'report.html'
 
+CONTRADICTED = 3
+"""Exit status where all is written, and scale bars, control points or checks contradict it."""
+
 _LENGTH = re.compile(r'(?P<number>[0-9.]+(e[+-]?[0-9]+)?) *(?P<unit>px|mm)?', re.IGNORECASE)
 
 
@@ -124,6 +127,14 @@ def _add_object_arguments(group: argparse._ArgumentGroup) -> None:
     )
 
 
+    group.add_argument(
+        '--keep-suspects',
+        action='store_true',
+        help='Use scale bars and control points that contradict the photographs all the same. '
+        'Without this they are named and left out.',
+    )
+
+
 def _add_observation_arguments(group: argparse._ArgumentGroup) -> None:
     text = 'Standard deviation of coordinates of image points without covariance, px.'
     add_option(group, Parameter('sigma', 0.1, text, minimum=1e-4, maximum=100.0))
@@ -171,7 +182,9 @@ def run(options: argparse.Namespace) -> int:
         for number, it in enumerate(solutions)
     ]
     written = [_write(it, number, options) for number, it in enumerate(solutions)]
-    return int(not all(written))
+    if not all(written):
+        return 1
+    return CONTRADICTED if any(it.suspects for it in solutions) else 0
 
 
 def _network(options: argparse.Namespace) -> tuple[Network, list[str]]:
@@ -243,7 +256,8 @@ def _oriented(network: Network, options: argparse.Namespace) -> list[Solution]:
     from ahf_ros.orientation.orient import orient
     from ahf_ros.orientation.solution import separated
 
-    return separated(orient(network, datum=Datum(*options.datum) if options.datum else Datum()))
+    datum = Datum(*options.datum) if options.datum else Datum()
+    return separated(orient(network, datum, keep_suspects=options.keep_suspects))
 
 
 def _of_groups(solutions: Sequence[Solution], number: int) -> tuple[str, ...]:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from itertools import combinations
 
 import numpy as np
@@ -49,6 +50,8 @@ def orient(
     datum: Datum | None = None,
     release: tuple[str, ...] | None = None,
     test: bool = True,
+    *,
+    keep_suspects: bool = False,
 ) -> list[Solution]:
     """Orient photographs and compute targets without any approximate values, and adjust them.
 
@@ -62,6 +65,8 @@ def orient(
         Parameters of the cameras that are estimated, as for `adjust`.
     test : bool
         Whether wrong observations are found and left out.
+    keep_suspects : bool
+        Whether bars and control points that contradict the photographs are used, as for `adjust`.
 
     Returns
     -------
@@ -95,12 +100,13 @@ def orient(
     (1500.0, (60, 60))
     """
     with one_blas_thread():
-        return _oriented(once_a_photograph(network), datum, release, test)
+        return _oriented(
+            once_a_photograph(network),
+            partial(adjust, datum=datum, release=release, test=test, keep_suspects=keep_suspects),
+        )
 
 
-def _oriented(
-    network: Network, datum: Datum | None, release: tuple[str, ...] | None, test: bool
-) -> list[Solution]:
+def _oriented(network: Network, adjusted: Callable[[Network, Start], Solution]) -> list[Solution]:
     """Return the solutions of a network in which a target is once in a photograph."""
     _check(network)
     refused: list[str] = []
@@ -108,7 +114,7 @@ def _oriented(
     for start in starts(network):
         reason = _ambiguous(network, start)
         if reason is None:
-            solution = adjust(network, start, datum, release, test)
+            solution = adjusted(network, start)
             reason = _doubtful(solution)
         if reason is None:
             warnings = solution.warnings + _lenses(solution)

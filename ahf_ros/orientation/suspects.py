@@ -37,7 +37,8 @@ from ahf_ros.orientation.testing import BY_CHANCE, special
 _DECISIVE = 2 * np.log(20)  # chi-square by which one is to blame rather than another: odds of 20
 _CHECKED = 1e-6  # share of a variance that others must leave for something to be tested
 _RANK = 1e-9  # of eigenvalues, relative to the largest
-_HALVINGS = 60
+_HALVINGS = 40
+_TINY = float(np.finfo(float).tiny)
 _LEAST = 1e-12  # probability that is said
 _NONE = np.array([], int)
 
@@ -50,15 +51,49 @@ class Examined(NamedTuple):
     warnings: tuple[str, ...]
 
 
-class _Tested(NamedTuple):
-    """Statistics of each group, its degrees of freedom, its gap, and both of all together."""
+@dataclass(frozen=True)
+class _Tested:
+    """Statistics of groups (g,), their degrees of freedom and gaps, and those of all together.
+
+    With a `common` variance, that of the others is estimated from them.
+    """
 
     statistics: FloatArray
     freedom: IntArray
-    gaps: list[FloatArray]
-    sigmas: list[float]
+    gaps: FloatArray
     whole: float
     redundancy: int
+    common: bool
+
+    @property
+    def external(self) -> FloatArray:
+        """Statistics by the variance that all but the tested one have."""
+        if not self.common:
+            return self.statistics
+        rest = np.maximum(self.redundancy - self.freedom, 1)
+        return self.statistics * rest / np.maximum(self.whole - self.statistics, _TINY)
+
+    @property
+    def chances(self) -> FloatArray:
+        """How often chance makes one of all statistics so large (Bonferroni)."""
+        able = self.freedom > 0
+        freedom = np.maximum(self.freedom, 1)
+        if self.common:
+            rest = self.redundancy - self.freedom
+            able &= rest > 0
+            chances = special().fdtrc(freedom, np.maximum(rest, 1), self.external / freedom)
+        else:
+            chances = special().chdtrc(freedom, self.statistics)
+        return np.where(able, np.minimum(able.sum() * chances, 1.0), 1.0)
+
+    @property
+    def gains(self) -> FloatArray:
+        """Twice the log likelihood that leaving out each gains, less its degrees of freedom."""
+        gains = self.statistics
+        if self.common:
+            left = np.maximum(self.whole - self.statistics, _TINY)
+            gains = self.redundancy * np.log(max(self.whole, _TINY) / left)
+        return np.where(self.freedom > 0, gains - self.freedom, -np.inf)
 
 
 @dataclass(frozen=True)
@@ -84,53 +119,69 @@ class _Misclosures:
         free = rows @ movements(points)
         return cls(tuple(names), group, gaps, free, given, rows @ covariance @ rows.T)
 
-    def tested(self, kept: IntArray, added: FloatArray) -> _Tested:
-        """Return the tests of kept groups, whose variances are larger by `added` (groups,)."""
+    def weighed(self, kept: IntArray, added: FloatArray) -> tuple[IntArray, FloatArray, int]:
+        """Return the groups of rows that are kept, P, and its rank.
+
+        Variances are larger by `added` (groups,).
+        """
         rows = np.isin(self.group, kept)
-        free, gaps, group = self.free[rows], self.gaps[rows], self.group[rows]
-        covariance = self.measured[np.ix_(rows, rows)]
-        covariance = covariance + np.diag(self.given[rows] + added[group])
+        free, group = self.free[rows], self.group[rows]
+        covariance = self.measured[np.ix_(rows, rows)] + np.diag(self.given[rows] + added[group])
         # What similarities change may have any variance: no test sees it (Rao 1973, 4i.4).
-        size = np.trace(covariance) / max(float((free**2).sum()), np.finfo(float).tiny)
+        size = np.trace(covariance) / max(float((free**2).sum()), _TINY)
         weight = np.linalg.inv(covariance + size * free @ free.T)
         normal = free.T @ weight @ free
-        inverse = np.linalg.pinv(normal, rcond=_RANK, hermitian=True)
-        residual = weight - weight @ free @ inverse @ free.T @ weight
+        sizes, axes = np.linalg.eigh(normal)
+        able = sizes > _RANK * sizes[-1]
+        half = weight @ free @ (axes[:, able] / np.sqrt(sizes[able]))
+        return group, weight - half @ half.T, int(rows.sum() - able.sum())
+
+    def criterion(self, among: IntArray, found: _Findings) -> float:
+        """Return Akaike's criterion of findings among groups."""
+        added = np.zeros(len(self.names))
+        added[found.blamed] = found.added**2
+        rows, kept = (np.isin(self.group, it) for it in (among, found.kept))
+        covariance = self.measured + np.diag(self.given + added[self.group])
+        covariance += np.trace(self.measured) / (self.free**2).sum() * self.free @ self.free.T
+        _, residual, _ = self.weighed(found.kept, added)
+        fit = np.linalg.slogdet(covariance[np.ix_(rows, rows)])[1]
+        fit += self.gaps[kept] @ residual @ self.gaps[kept]
+        return float(fit + 2 * ((rows & ~kept).sum() + (found.added > 0)))
+
+    def tested(self, kept: IntArray, common: IntArray = _NONE, sigma: float = 0.0) -> _Tested:
+        """Return the tests of kept groups, those in `common` with a further sigma."""
+        added = np.zeros(len(self.names))
+        added[common] = sigma**2
+        group, residual, redundancy = self.weighed(kept, added)
+        gaps = self.gaps[np.isin(self.group, kept)]
         pulls = residual @ gaps
         statistics, freedom = np.zeros(len(kept)), np.zeros(len(kept), int)
-        differences, sigmas = [], []
+        differences = np.zeros(len(kept))
         for place, number in enumerate(kept):
             own = group == number
             sizes, axes = np.linalg.eigh(residual[np.ix_(own, own)])
-            checked = sizes > _CHECKED * np.diag(weight)[own].max()
-            along = axes.T @ pulls[own]
-            difference = axes[:, checked] @ (along[checked] / sizes[checked])
-            statistics[place] = float((along[checked] ** 2 / sizes[checked]).sum())
+            checked = sizes > _CHECKED * np.abs(residual).max()
+            along = (axes.T @ pulls[own])[checked]
+            statistics[place] = float((along**2 / sizes[checked]).sum())
+            differences[place] = float(np.linalg.norm(along / sizes[checked]))
             freedom[place] = int(checked.sum())
-            differences.append(difference)
-            length = float(np.linalg.norm(difference))
-            sigmas.append(length / max(float(np.sqrt(statistics[place])), np.finfo(float).tiny))
-        redundancy = int(rows.sum()) - int(np.linalg.matrix_rank(normal, _rank(normal), True))
-        whole = float(gaps @ residual @ gaps)
-        return _Tested(statistics, freedom, differences, sigmas, whole, redundancy)
+        whole = float(gaps @ pulls)
+        return _Tested(statistics, freedom, differences, whole, redundancy, len(common) > 0)
 
     def agreeing(self, kept: IntArray, blamed: IntArray) -> float:
         """Return the standard deviation, beside the given one, at which kept groups agree.
 
         That of blamed groups grows until the statistic of all is their redundancy.
         """
+        gaps = self.gaps[np.isin(self.group, kept)]
         added = np.zeros(len(self.names))
-        low, high = 0.0, float(np.abs(self.gaps).max()) * 2
+        low, high = 0.0, 2 * float(np.abs(self.gaps).max())
         for _ in range(_HALVINGS):
             middle = (low + high) / 2
             added[blamed] = middle**2
-            found = self.tested(kept, added)
-            low, high = (middle, high) if found.whole > found.redundancy else (low, middle)
+            _, residual, redundancy = self.weighed(kept, added)
+            low, high = (middle, high) if gaps @ residual @ gaps > redundancy else (low, middle)
         return high
-
-
-def _rank(matrix: FloatArray) -> float:
-    return float(_RANK * np.abs(matrix).max())
 
 
 @dataclass
@@ -154,19 +205,18 @@ def examined(
     so.
     """
     closures = _Misclosures.of(known, points, covariance)
-    told = [it.check for it in (*known.bars, *known.control)]
-    used = np.flatnonzero(~np.array(told, bool))
+    told = np.array([it.check for it in known.bars] + [it.check for it in known.control], bool)
+    used = np.flatnonzero(~told)
     if not len(used):
         return Examined(network, (), ())
-    if not closures.tested(used, np.zeros(len(told))).redundancy:
-        return Examined(
-            network, (), _unchecked([closures.names[it] for it in used], not any(told))
-        )
+    if not closures.tested(used).redundancy:
+        names = [closures.names[it] for it in used]
+        return Examined(network, (), () if told.any() else _unchecked(names))
     found = _found(closures, used)
-    if any(it.rivals for it in found.suspects) and any(told):
+    if any(it.rivals for it in found.suspects) and told.any():
         heard = _found(closures, np.arange(len(told)))
-        names = {closures.names[it] for it in used}
-        if all(it.name in names and not it.rivals for it in heard.suspects):
+        ours = {closures.names[it] for it in used}
+        if all(it.name in ours and not it.rivals for it in heard.suspects):
             found = heard
     warnings = _words(network, closures, found, keep)
     if keep:
@@ -179,16 +229,20 @@ def examined(
 
 
 def _found(closures: _Misclosures, among: IntArray) -> _Findings:
-    """Return who is to blame among groups: few, those whose precision nobody gave, or all."""
+    """Return who is to blame among groups: few, those whose precision nobody gave, or all.
+
+    Where some came without precision, it may be that few are wrong, or that all are imprecise;
+    Akaike's criterion decides.
+    """
     given = np.bincount(closures.group, closures.given)
     silent = among[given[among] == 0]
-    found = _search(closures, among, _NONE)
-    if found and (not found.suspects or not len(silent)):
-        return found
-    for common in (silent, among):
-        if len(common) and (found := _search(closures, among, common)):
-            return found
-    return _Findings(among, [], among, closures.agreeing(among, among))
+    tried = [_search(closures, among, _NONE)]
+    if len(silent):
+        tried.append(_search(closures, among, silent))
+    if found := [it for it in tried if it is not None]:
+        return min(found, key=lambda it: closures.criterion(among, it))
+    all_alike = _search(closures, among, among)
+    return all_alike or _Findings(among, [], among, closures.agreeing(among, among))
 
 
 def _search(closures: _Misclosures, among: IntArray, common: IntArray) -> _Findings | None:
@@ -198,24 +252,20 @@ def _search(closures: _Misclosures, among: IntArray, common: IntArray) -> _Findi
     """
     kept, suspects = among, list[Suspect]()
     while 2 * len(suspects) < len(among):
-        added = np.zeros(len(closures.names))
         sigma = closures.agreeing(kept, common) if len(common) else 0.0
-        added[common] = sigma**2
-        test = closures.tested(kept, added)
-        chances, excess = _chances(test, len(common) > 0), _excess(test, len(common) > 0)
-        worst = int(np.argmax(excess))
+        test = closures.tested(kept, common, sigma)
+        chances, gains = test.chances, test.gains
+        worst = int(np.argmax(gains))
         if chances[worst] >= BY_CHANCE:
-            fits = not len(common) or test.whole <= 2 * test.redundancy
-            return _Findings(kept, suspects, np.intersect1d(common, kept), sigma) if fits else None
-        near = np.flatnonzero(excess > excess[worst] - _DECISIVE)
+            return _Findings(kept, suspects, np.intersect1d(common, kept), sigma)
+        near = np.flatnonzero(gains > gains[worst] - _DECISIVE)
         rivals = [int(it) for it in near if it != worst]
-        gap = float(np.linalg.norm(test.gaps[worst]))
         suspects.append(
             Suspect(
                 closures.names[kept[worst]],
-                gap,
-                test.sigmas[worst],
-                float(min(chances[worst], 1.0)),
+                float(test.gaps[worst]),
+                float(test.gaps[worst] / np.sqrt(test.external[worst])),
+                float(chances[worst]),
                 'unclear' if rivals else 'left out',
                 tuple(closures.names[kept[it]] for it in rivals),
             )
@@ -225,29 +275,6 @@ def _search(closures: _Misclosures, among: IntArray, common: IntArray) -> _Findi
             return _Findings(kept, suspects, blamed, closures.agreeing(kept, blamed))
         kept = np.delete(kept, worst)
     return None
-
-
-def _chances(test: _Tested, common: bool) -> FloatArray:
-    """Return how often chance makes one of all statistics so large."""
-    number = max(int((test.freedom > 0).sum()), 1)
-    freedom = np.maximum(test.freedom, 1)
-    if not common:
-        chances = special().chdtrc(freedom, test.statistics)
-    else:
-        rest = test.redundancy - test.freedom
-        left = np.maximum(test.whole - test.statistics, np.finfo(float).tiny)
-        ratio = test.statistics / freedom / (left / np.maximum(rest, 1))
-        chances = np.where(rest > 0, special().fdtrc(freedom, np.maximum(rest, 1), ratio), 1.0)
-    return np.where(test.freedom > 0, number * chances, 1.0)
-
-
-def _excess(test: _Tested, common: bool) -> FloatArray:
-    """Return twice the log likelihood that each alone explains, less its degrees of freedom."""
-    gain = test.statistics
-    if common:
-        left = np.maximum(test.whole - test.statistics, np.finfo(float).tiny)
-        gain = test.redundancy * np.log(max(test.whole, np.finfo(float).tiny) / left)
-    return np.where(test.freedom > 0, gain - test.freedom, -np.inf)
 
 
 def _believed(network: Network, closures: _Misclosures, found: _Findings) -> Network:
@@ -288,7 +315,8 @@ def _words(
         'says which. Measure them again'
         if it.rivals
         else f'{it.name} contradicts the rest by {with_unit(it.gap, unit)}, '
-        f'{it.gap / it.sigma:.1f} standard deviations (probability {max(it.probability, _LEAST):.1g}): '
+        f'{it.gap / it.sigma:.1f} standard deviations (probability '
+        f'{max(it.probability, _LEAST):.1g}): '
         + ('it is used all the same' if keep else 'it is left out')
         for it in found.suspects
     ]
@@ -306,10 +334,9 @@ def _words(
     return tuple(warnings)
 
 
-def _unchecked(names: Sequence[str], alone: bool) -> tuple[str, ...]:
-    """Return that nothing checks what is known, unless there are checks."""
+def _unchecked(names: Sequence[str]) -> tuple[str, ...]:
+    """Return that nothing checks what is known."""
     them, are = ('it', 'is') if len(names) == 1 else ('them', 'are')
-    text = (
-        f'{", ".join(names)} {are} believed: nothing checks {them}. Give another one, or a check'
+    return (
+        f'{", ".join(names)} {are} believed: nothing checks {them}. Give another one, or a check',
     )
-    return (text,) if alone else ()
