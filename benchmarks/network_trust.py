@@ -17,8 +17,9 @@ import numpy as np
 
 from ahf_ros.orientation.adjustment import adjust
 from ahf_ros.orientation.camera import PARAMETERS, project
+from ahf_ros.orientation.measurement import distances
 from ahf_ros.orientation.network import ControlPoint, Network, ScaleBar
-from ahf_ros.orientation.points import entries
+from ahf_ros.orientation.points import MeasuredPoints, entries
 from ahf_ros.orientation.similarity import similarity_between
 from ahf_ros.orientation.solution import Solution, Start
 from benchmarks.network_ellipsoids import coverage
@@ -186,14 +187,17 @@ def told_table(seeds: Sequence[int], runs: int) -> list[str]:
         for run in progress(range(runs), kind):
             random = np.random.default_rng([seeds[0], len(kind), round(sigma * 1e6), run])
             network, truth = simulate(Field(12, 40), random)
-            told, wrong, size = _told(kind, counts[run % len(counts)], sigma, truth, random)
-            solution = adjust(replace(network, **told), approximate(truth, random, 0.005))
-            alone = [it.name for it in solution.suspects if not it.rivals]
+            start = approximate(truth, random, 0.005)
+            alone = adjust(network, start).measured_points
+            count = counts[run % len(counts)]
+            told, wrong, size = _told(kind, count, sigma, truth, alone, random)
+            solution = adjust(replace(network, **told), start)
+            clear = [it.name for it in solution.suspects if not it.rivals]
             either = {name for it in solution.suspects for name in (it.name, *it.rivals)}
             large += size > LARGE
-            named += size > LARGE and wrong in alone
-            unclear += size > LARGE and wrong in either and wrong not in alone
-            good += sum(name != wrong for name in alone)
+            named += size > LARGE and wrong in clear
+            unclear += size > LARGE and wrong in either and wrong not in clear
+            good += sum(name != wrong for name in clear)
             rays += len(network.observations.xy) - int(solution.start.used.sum())
         rows.append(
             (
@@ -211,30 +215,39 @@ def told_table(seeds: Sequence[int], runs: int) -> list[str]:
 
 
 def _told(
-    kind: str, count: int, sigma: float, truth: Start, random: np.random.Generator
+    kind: str,
+    count: int,
+    sigma: float,
+    truth: Start,
+    alone: MeasuredPoints,
+    random: np.random.Generator,
 ) -> tuple[dict[str, object], str, float]:
     """Return what is told, which of it is wrong, and by how many standard deviations.
 
-    These are of what is told and of the network, about 2e-5, together.
+    These are of what is told and of the photographs alone, together.
     """
-    together = float(np.hypot(sigma, 2e-5))
     size = 4 * 100 ** random.random()
-    names = random.permutation(len(truth.points))
+    names = [str(it) for it in random.permutation(len(truth.points))]
     if kind == 'bars':
-        bars = []
-        for place, (first, second) in enumerate(names[: 2 * count].reshape(-1, 2)):
-            length = np.linalg.norm(truth.points[first] - truth.points[second])
-            error = random.normal(0, sigma) + (place == 0) * size * together * random.choice(
-                [-1, 1]
-            )
-            bars.append(ScaleBar((str(first), str(second)), float(length + error), sigma))
-        return {'bars': tuple(bars), 'unit': 'm'}, f'scale bar {"-".join(bars[0].ends)}', size
+        pairs = list(zip(names[:count], names[count : 2 * count], strict=True))
+        lengths = [np.linalg.norm(truth.points[int(a)] - truth.points[int(b)]) for a, b in pairs]
+        together = np.hypot(sigma, distances(alone, pairs[:1])[0].sigma)
+        errors = random.normal(0, sigma, count)
+        errors[0] += size * together * random.choice([-1, 1])
+        bars = [
+            ScaleBar(pair, float(length + error), sigma)
+            for pair, length, error in zip(pairs, lengths, errors, strict=True)
+        ]
+        return {'bars': tuple(bars), 'unit': 'm'}, f'scale bar {"-".join(pairs[0])}', size
     towards = random.standard_normal(3)
-    towards *= size * together / np.linalg.norm(towards)
+    towards /= np.linalg.norm(towards)
+    together = np.sqrt(sigma**2 + towards @ alone.chosen(names[:1]).covariance @ towards)
     control = tuple(
         ControlPoint(
-            str(name),
-            truth.points[name] + random.normal(0, sigma, 3) + (place == 0) * towards,
+            name,
+            truth.points[int(name)]
+            + random.normal(0, sigma, 3)
+            + (place == 0) * size * together * towards,
             sigma**2 * np.eye(3),
         )
         for place, name in enumerate(names[:count])

@@ -136,18 +136,6 @@ class _Misclosures:
         half = weight @ free @ (axes[:, able] / np.sqrt(sizes[able]))
         return group, weight - half @ half.T, int(rows.sum() - able.sum())
 
-    def criterion(self, among: IntArray, found: _Findings) -> float:
-        """Return Akaike's criterion of findings among groups."""
-        added = np.zeros(len(self.names))
-        added[found.blamed] = found.added**2
-        rows, kept = (np.isin(self.group, it) for it in (among, found.kept))
-        covariance = self.measured + np.diag(self.given + added[self.group])
-        covariance += np.trace(self.measured) / (self.free**2).sum() * self.free @ self.free.T
-        _, residual, _ = self.weighed(found.kept, added)
-        fit = np.linalg.slogdet(covariance[np.ix_(rows, rows)])[1]
-        fit += self.gaps[kept] @ residual @ self.gaps[kept]
-        return float(fit + 2 * ((rows & ~kept).sum() + (found.added > 0)))
-
     def tested(self, kept: IntArray, common: IntArray = _NONE, sigma: float = 0.0) -> _Tested:
         """Return the tests of kept groups, those in `common` with a further sigma."""
         added = np.zeros(len(self.names))
@@ -229,20 +217,16 @@ def examined(
 
 
 def _found(closures: _Misclosures, among: IntArray) -> _Findings:
-    """Return who is to blame among groups: few, those whose precision nobody gave, or all.
-
-    Where some came without precision, it may be that few are wrong, or that all are imprecise;
-    Akaike's criterion decides.
-    """
+    """Return who is to blame among groups: few, those whose precision nobody gave, or all."""
     given = np.bincount(closures.group, closures.given)
     silent = among[given[among] == 0]
-    tried = [_search(closures, among, _NONE)]
-    if len(silent):
-        tried.append(_search(closures, among, silent))
-    if found := [it for it in tried if it is not None]:
-        return min(found, key=lambda it: closures.criterion(among, it))
-    all_alike = _search(closures, among, among)
-    return all_alike or _Findings(among, [], among, closures.agreeing(among, among))
+    found = _search(closures, among, _NONE)
+    if found and not (found.suspects and len(silent)):
+        return found
+    for common in (silent, among):
+        if len(common) and (found := _search(closures, among, common)):
+            return found
+    return _Findings(among, [], among, closures.agreeing(among, among))
 
 
 def _search(closures: _Misclosures, among: IntArray, common: IntArray) -> _Findings | None:
