@@ -24,8 +24,8 @@ from ahf_ros.orientation.normals import Layout
 from ahf_ros.orientation.precision import Precision, of_computed, precision
 from ahf_ros.orientation.solution import Start
 from ahf_ros.orientation.testing import (
-    BY_CHANCE,
     CRITICAL,
+    SIGNIFICANCE,
     Tails,
     UnitWeight,
     normalised,
@@ -219,10 +219,12 @@ def rejections(
     reasons: dict[int, str] = {}
     warnings = []
     off = np.flatnonzero(~result.used)
-    for target in np.unique(every.point[off]):
+    targets, wrong = np.unique(every.point[off], return_counts=True)
+    level = SIGNIFICANCE / max(int((wrong > 1).sum()), 1)
+    for target in targets:
         rows = off[every.point[off] == target]
         for place in places(every, state, rows, critical):
-            if not _moved(every, state, place, rows):
+            if _by_chance(every, state, place, rows) > level:
                 continue
             moved = place.point - state.points[every.points[target]]
             name = network.targets[every.points[target]]
@@ -256,12 +258,12 @@ def rejections(
     return tuple(rejected), tuple(warnings)
 
 
-def _moved(every: Layout, state: Start, place: Place, rows: NDArray[np.int64]) -> bool:
-    """Return whether a target was at a place, of all places that some of its wrong rays have.
+def _by_chance(every: Layout, state: Start, place: Place, rows: NDArray[np.int64]) -> float:
+    """Return how often some of a target's wrong rays meet so well at one place by chance.
 
-    A shift of the target explains three of the coordinates of its residuals. Whether it explains
-    more than three of any that were wrong by chance is an F-test; rays of another place meet there
-    much better. It is made for each choice of as many rays.
+    A shift of the target explains three of the coordinates of their residuals, and more than three
+    of any that are wrong by chance only if they come from another place: an F-test, made for each
+    choice of as many rays.
     """
     free = 2 * len(place.rows) - 3
     targets = state.points[every.points[every.point[place.rows]]]
@@ -269,11 +271,9 @@ def _moved(every: Layout, state: Start, place: Place, rows: NDArray[np.int64]) -
         float((normals.lengths_at(every, state, place.rows, points) ** 2).sum())
         for points in (targets, np.tile(place.point, (len(place.rows), 1)))
     )
-    if here <= there:
-        return False
     ratio = (here - there) / 3 / max(there / free, np.finfo(float).tiny)
     choices = math.comb(len(rows), len(place.rows))
-    return bool(special().fdtrc(3, free, ratio) * choices < BY_CHANCE)
+    return choices * float(special().fdtrc(3, free, max(ratio, 0.0)))
 
 
 def _other_target(every: Layout, state: Start, row: int, tolerance: float) -> int | None:
