@@ -126,7 +126,6 @@ def _add_object_arguments(group: argparse._ArgumentGroup) -> None:
         'control points, else inner.',
     )
 
-
     group.add_argument(
         '--keep-suspects',
         action='store_true',
@@ -320,7 +319,8 @@ def print_network(solution: Solution, folder: str, console: Console | None = Non
     for index in solution.calibrated.nonzero()[0].tolist():
         rows = network_summary.camera_rows(solution, index)
         title = f'Camera {solution.network.cameras[index].name}'
-        print_table(title, ('parameter', 'value', 'standard deviation'), rows, console)
+        of_camera = 'parameter', 'value', 'standard deviation', 'ratio'
+        print_table(title, of_camera, rows, console)
     if bars := network_summary.bar_rows(solution):
         head = '', 'role', f'length, {unit}', 'deviation', 'sigma', 'ratio'
         print_table('Scale bars', head, bars, console)

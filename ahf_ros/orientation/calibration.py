@@ -15,8 +15,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ahf_ros.orientation.camera import PARAMETERS, known_calibration
-from ahf_ros.orientation.network import FloatArray, IntArray, Network
+from ahf_ros.orientation.camera import known_calibration
+from ahf_ros.orientation.network import CameraView, FloatArray, IntArray, Network
 from ahf_ros.orientation.normals import Layout
 from ahf_ros.orientation.solution import Start
 
@@ -48,6 +48,16 @@ _FACING = 0.5  # cosine between the axes of photographs whose roll is compared
 _COMPARED = 100  # photographs of a camera whose roll is compared, spread evenly
 
 
+def usual_deviations(view: CameraView, focal_length: float) -> dict[str, float]:
+    """Return the standard deviations of what is usual of a camera, in the order of `PARAMETERS`.
+
+    Its focal length in px counts where none is given.
+    """
+    given, off = known_calibration(view)[0], OFF_CENTRE * max(view.width, view.height)
+    f = FOCAL_LENGTH * given if np.isfinite(given) else UNKNOWN_FOCAL_LENGTH * focal_length
+    return {'f': float(f), 'cx': off, 'cy': off, **USUAL}
+
+
 def usual(
     network: Network, layout: Layout, approximate: FloatArray | None = None
 ) -> tuple[IntArray, FloatArray, FloatArray]:
@@ -56,22 +66,15 @@ def usual(
     What is given of a camera is usual of it. A focal length that is not given is near its
     approximate value in `approximate` (cameras, parameters), or left open without one.
     """
-    rows: list[tuple[int, float, float]] = []
-    for place, view in enumerate(network.cameras):
-        middle, relative = known_calibration(view).copy(), FOCAL_LENGTH
-        if approximate is not None and not np.isfinite(middle[0]):
-            middle[0], relative = approximate[place, 0], UNKNOWN_FOCAL_LENGTH
-        off = OFF_CENTRE * max(view.width, view.height)
-        sigmas = USUAL | {'f': relative * middle[0], 'cx': off, 'cy': off}
-        rows += [
-            (column, middle[index], sigmas[name])
-            for index, (name, column) in enumerate(
-                zip(PARAMETERS, layout.columns[place], strict=True)
-            )
-            if column >= 0 and np.isfinite(sigmas[name])
-        ]
-    columns, middles, deviations = np.array(rows).reshape(-1, 3).T
-    return columns.astype(int), middles, deviations
+    focal = np.full(len(network.cameras), np.nan) if approximate is None else approximate[:, 0]
+    middles = np.array([known_calibration(view) for view in network.cameras])
+    middles[:, 0] = np.where(np.isfinite(middles[:, 0]), middles[:, 0], focal)
+    sigmas = np.array(
+        [list(usual_deviations(*it).values()) for it in zip(network.cameras, focal, strict=True)]
+    )
+    columns = layout.columns
+    known = (columns >= 0) & np.isfinite(middles)
+    return columns[known], middles[known], sigmas[known]
 
 
 def undetermined(

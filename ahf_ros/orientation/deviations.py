@@ -82,11 +82,11 @@ def failed_checks(solution: Solution, left_out: Sequence[Suspect] = ()) -> tuple
     found = []
     for bar in bar_deviations(solution):
         statistic, gap = (bar.deviation / bar.sigma) ** 2, abs(bar.deviation)
-        found.append((bar.bar.check, f'scale bar {"-".join(bar.bar.ends)}', 1, statistic, gap))
+        found.append((bar.bar.check, bar.bar.title, 1, statistic, gap))
     for it in control_deviations(solution):
         statistic = float(it.deviation @ np.linalg.pinv(it.covariance) @ it.deviation)
         gap = float(np.linalg.norm(it.deviation))
-        found.append((it.point.check, f'control point {it.point.name}', 3, statistic, gap))
+        found.append((it.point.check, it.point.title, 3, statistic, gap))
     return tuple(
         Suspect(name, gap, gap / math.sqrt(statistic), probability, 'failed')
         for check, name, freedom, statistic, gap in found

@@ -112,8 +112,7 @@ class _Misclosures:
         """Return what bars and control points have over measured points."""
         parts = of_bars(known, points), of_control(known, points)
         rows, gaps, given = (np.concatenate(column) for column in zip(*parts, strict=True))
-        names = [f'scale bar {"-".join(bar.ends)}' for bar in known.bars]
-        names += [f'control point {point.name}' for point in known.control]
+        names = [it.title for it in known.bars] + [it.title for it in known.control]
         group = np.r_[np.arange(len(known.bars)), np.repeat(np.arange(len(known.control)), 3)]
         group[len(known.bars) :] += len(known.bars)
         free = rows @ movements(points)
@@ -265,27 +264,19 @@ def _believed(network: Network, closures: _Misclosures, found: _Findings) -> Net
     """Return the network whose suspects are checks, and whose blamed ones have their variance."""
     left_out = {it.name for it in found.suspects if it.verdict == 'left out'}
     blamed = {closures.names[it] for it in found.blamed}
-
-    def sigma(name: str) -> float:
-        return found.added if name in blamed else 0.0
-
-    bars = tuple(
-        replace(
-            bar,
-            check=bar.check or name in left_out,
-            sigma=float(np.hypot(bar.sigma, 0 if bar.check else sigma(name))),
-        )
-        for bar, name in ((it, f'scale bar {"-".join(it.ends)}') for it in network.bars)
-    )
-    control = tuple(
-        replace(
-            point,
-            check=point.check or name in left_out,
-            covariance=point.covariance + (0 if point.check else sigma(name) ** 2) * np.eye(3),
-        )
-        for point, name in ((it, f'control point {it.name}') for it in network.control)
-    )
-    return replace(network, bars=bars, control=control)
+    bars, control = list(network.bars), list(network.control)
+    for place, bar in enumerate(bars):
+        if bar.title in left_out:
+            bars[place] = replace(bar, check=True)
+        elif bar.title in blamed and not bar.check:
+            bars[place] = replace(bar, sigma=float(np.hypot(bar.sigma, found.added)))
+    for place, point in enumerate(control):
+        if point.title in left_out:
+            control[place] = replace(point, check=True)
+        elif point.title in blamed and not point.check:
+            covariance = point.covariance + found.added**2 * np.eye(3)
+            control[place] = replace(point, covariance=covariance)
+    return replace(network, bars=tuple(bars), control=tuple(control))
 
 
 def _words(
