@@ -161,6 +161,60 @@ def test_bars_give_scale_and_redundancy(scene):
     assert distance(solution.start.points, 0, 1) == pytest.approx(bars[0].length, abs=1e-8)
 
 
+@pytest.mark.parametrize('planar', [False, True])
+@pytest.mark.parametrize('sigma', [0.0, 1e-4])
+def test_a_known_field_calibrates_its_camera(planar, sigma):
+    random = np.random.default_rng(12)
+    network, truth = simulate(replace(FIELD, planar=planar), random)
+    control = tuple(
+        ControlPoint(name, place + random.normal(0, sigma, 3), sigma**2 * np.eye(3))
+        for name, place in zip(network.targets, truth.points, strict=True)
+    )
+    network = replace(network, control=control, unit='m')
+    solution = adjust(network, approximate(truth, random))
+    error = solution.start.calibrations[0] - truth.calibrations[0]
+    deviations = np.sqrt(np.diag(solution.camera_covariances[0]))
+    assert (np.abs(error) < 3.5 * deviations).all()
+    assert deviations[0] < 1
+    assert not solution.suspects
+    assert np.isfinite(solution.measured_points.covariance).all()
+
+
+def test_photographs_without_rolls_know_less_of_the_principal_point_and_say_so():
+    errors, deviations = [], []
+    for rolled in (True, False):
+        random = np.random.default_rng(13)
+        network, truth = simulate(replace(FIELD, rolled=rolled), random)
+        solution = adjust(network, approximate(truth, random))
+        errors.append(solution.start.calibrations[0, 1:3] - truth.calibrations[0, 1:3])
+        deviations.append(np.sqrt(np.diag(solution.camera_covariances[0])[1:3]))
+    assert (np.abs(errors) < 3.5 * np.array(deviations)).all()
+    assert (deviations[1] > 1.3 * deviations[0]).all()
+
+
+def test_heavy_tails_are_no_reason_to_reject():
+    kept, expected = 0, 0.0
+    for run in range(3):
+        random = np.random.default_rng([14, run])
+        network, truth = simulate(Field(16, 40), random)
+        seen = network.observations
+        exact = project(
+            truth.calibrations[0],
+            truth.rotations[seen.photograph],
+            truth.positions[seen.photograph],
+            truth.points[seen.point],
+        )
+        heavier = np.sqrt(5 / random.chisquare(5, len(exact)))[:, None]
+        xy = exact + heavier * (seen.xy - exact)
+        start = approximate(truth, random, 0.005)
+        solution = adjust(replace(network, observations=replace(seen, xy=xy)), start)
+        kept += solution.start.used.mean() / 3
+        expected += solution.expected_rejections
+        assert not any('at two places' in text for text in solution.warnings)
+    assert kept > 0.99
+    assert expected > 1
+
+
 def test_fixed_control_points_stay(scene):
     network, truth, start = scene
     control = named(scene, '0369', scale=1000, offset=5.0)
