@@ -260,13 +260,19 @@ def _oriented(network: Network, options: argparse.Namespace) -> list[Solution]:
 
 
 def _of_groups(solutions: Sequence[Solution], number: int) -> tuple[str, ...]:
-    """Return what a group is told of the others."""
-    if len(solutions) == 1:
-        return ()
-    return (
-        f'group {number + 1} of {len(solutions)} that have too few targets in common, each in a '
-        'frame of its own',
-    )
+    """Return that a group is one of several, and that its unit is unlikely."""
+    import numpy as np
+
+    from ahf_ros.orientation.units import unlikely
+
+    points = solutions[number].measured_points
+    notes = [unlikely(float(np.linalg.norm(np.ptp(points.xyz, axis=0))), points.unit)]
+    if len(solutions) > 1:
+        notes.append(
+            f'group {number + 1} of {len(solutions)} that have too few targets in common, each in '
+            'a frame of its own'
+        )
+    return tuple(it for it in notes if it)
 
 
 def _write(solution: Solution, number: int, options: argparse.Namespace) -> bool:

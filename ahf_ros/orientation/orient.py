@@ -13,9 +13,11 @@ from ahf_ros.blas import one_blas_thread
 from ahf_ros.orientation.adjustment import adjust
 from ahf_ros.orientation.calibration import UNDETERMINED
 from ahf_ros.orientation.datum import Datum
+from ahf_ros.orientation.lens_model import unsuitable_lenses
 from ahf_ros.orientation.network import FloatArray, IntArray, Network, once_a_photograph
 from ahf_ros.orientation.planar import principal_axes
 from ahf_ros.orientation.resection import FEWEST_POINTS
+from ahf_ros.orientation.similarity import in_principal_axes
 from ahf_ros.orientation.solution import Solution, Start
 from ahf_ros.orientation.start import FEWEST_PHOTOGRAPHS, oriented, reversal, starts
 from ahf_ros.orientation.triples import FEWEST_COMMON, known_calibrations
@@ -31,10 +33,6 @@ CONTRADICTING = 0.6
 
 Those of its targets in photographs that could not be oriented disagree.
 """
-
-FEWEST_OF_A_LENS = 5
-BELIEVED_LENS = 0.8
-"""Photographs, and the share of their observations that must agree, for a lens to be believed."""
 
 NAMED = 8
 """Photographs or targets that a message names."""
@@ -111,13 +109,13 @@ def _oriented(network: Network, adjusted: Callable[[Network, Start], Solution]) 
     _check(network)
     refused: list[str] = []
     solutions: list[Solution] = []
-    for start in starts(network):
+    for start in map(in_principal_axes, starts(network)):
         reason = _ambiguous(network, start)
         if reason is None:
             solution = adjusted(network, start)
             reason = _doubtful(solution)
         if reason is None:
-            warnings = solution.warnings + _lenses(solution)
+            warnings = solution.warnings + unsuitable_lenses(solution)
             solutions.append(replace(solution, warnings=warnings))
         else:
             refused.append(reason)
@@ -234,32 +232,6 @@ def _doubtful(solution: Solution) -> str | None:
             'targets moved'
         )
     return None
-
-
-def _lenses(solution: Solution) -> tuple[str, ...]:
-    """Return warnings of lenses that were estimated and hardly checked.
-
-    What such photographs do not determine of a lens stays zero, and no covariance knows of it.
-    """
-    network, start = solution.network, solution.start
-    posed = np.isfinite(start.positions[:, 0])
-    warnings = []
-    for camera, view in enumerate(network.cameras):
-        own = posed & (network.camera_of == camera)
-        estimated = set(solution.released[camera]) - {'f'}
-        if view.calibration is not None or not estimated or not own.any():
-            continue
-        belongs = own[network.observations.photograph]
-        share = float(np.mean(start.used[belongs]))
-        if own.sum() < FEWEST_OF_A_LENS or share < BELIEVED_LENS:
-            warnings.append(
-                f'camera {view.name}: its lens is estimated from {own.sum()} photographs, of '
-                f'whose observations {share:.0%} agree. Coordinates may be off by many of their '
-                'standard deviations. Give a calibration, or take '
-                f'{FEWEST_OF_A_LENS} photographs or more: '
-                f'{TILT}'
-            )
-    return tuple(warnings)
 
 
 def _left_out(network: Network, solutions: Sequence[Solution]) -> tuple[str, ...]:
