@@ -216,16 +216,34 @@ def examined(
 
 
 def _found(closures: _Misclosures, among: IntArray) -> _Findings:
-    """Return who is to blame among groups: few, those whose precision nobody gave, or all."""
+    """Return who is to blame among groups: few, those whose precision nobody gave, or all.
+
+    All are where even a larger variance makes too many of them suspects, or none.
+    """
     given = np.bincount(closures.group, closures.given)
     silent = among[given[among] == 0]
     found = _search(closures, among, _NONE)
     if found and not (found.suspects and len(silent)):
         return found
-    for common in (silent, among):
-        if len(common) and (found := _search(closures, among, common)):
-            return found
-    return _Findings(among, [], among, closures.agreeing(among, among))
+    if len(silent) and (found := _search(closures, among, silent)):
+        return found
+    found = _search(closures, among, among)
+    return found if found and found.suspects else _all_to_blame(closures, among)
+
+
+def _all_to_blame(closures: _Misclosures, among: IntArray) -> _Findings:
+    """Return that groups contradict each other, and none more than others."""
+    test = closures.tested(among)
+    worst = int(np.argmax(test.gains))
+    suspect = Suspect(
+        closures.names[among[worst]],
+        float(test.gaps[worst]),
+        float(test.gaps[worst] / np.sqrt(test.external[worst])),
+        float(test.chances[worst]),
+        'unclear',
+        tuple(closures.names[it] for it in np.delete(among, worst)),
+    )
+    return _Findings(among, [suspect], among, closures.agreeing(among, among))
 
 
 def _search(closures: _Misclosures, among: IntArray, common: IntArray) -> _Findings | None:

@@ -304,6 +304,16 @@ def test_of_two_bars_that_contradict_both_are_named(scene):
     assert sigma > 0.002  # what they contradict each other by is in the covariance
 
 
+def test_bars_that_all_contradict_each_other_are_all_named(scene):
+    network, truth, start = scene
+    bars = bars_of(truth, (1.0, 1.01, 1.02, 0.99, 0.985, 1.015))
+    solution = adjust(replace(network, bars=bars, unit='m'), start)
+    (suspect,) = solution.suspects
+    assert len(suspect.rivals) == 5
+    assert 0.003 < solution.network.bars[0].sigma < 0.03
+    assert not solution.rejected
+
+
 def test_one_bar_cannot_be_checked(scene):
     network, truth, start = scene
     network = replace(network, bars=bars_of(truth, (1.01,)), unit='m')
