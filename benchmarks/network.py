@@ -32,6 +32,7 @@ TABLES: dict[str, Callable[[int, int | None], list[str]]] = {
     'scale': lambda seed, runs: network_scale.table([seed]),
     'panel': lambda seed, runs: network_starts.panel(),
     'lenses': lambda seed, runs: network_trust.lenses_table([seed], runs or 250),
+    'still': lambda seed, runs: network_trust.still_table([seed], runs or 400),
     'tails': lambda seed, runs: network_trust.tails_table([seed], runs or 1000),
     'told': lambda seed, runs: network_trust.told_table([seed], runs or 500),
     'starts': lambda seed, runs: network_starts.starts_table([seed], runs or 250),

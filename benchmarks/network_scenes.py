@@ -34,15 +34,20 @@ LENS = pinhole(3200, WIDTH, HEIGHT) + np.array([0, 15, -10, -0.1, 0.03, 0, 4e-4,
 
 
 def simulate(
-    field: Field, random: np.random.Generator, lenses: np.ndarray = LENS[None]
+    field: Field,
+    random: np.random.Generator,
+    lenses: np.ndarray = LENS[None],
+    targets: np.ndarray | None = None,
 ) -> tuple[Network, Start]:
     """Return a network with noise in its image points, and the true values.
 
     Standard deviations of centres vary by a factor of two, and are those of the noise. Cameras of
-    calibrations `lenses` (cameras, parameters) take turns.
+    calibrations `lenses` (cameras, parameters) take turns. The
+    places of targets (n, 3) may be given.
     """
     camera_of = np.arange(field.photographs) % len(lenses)
     points = random.uniform(-1, 1, (field.targets, 3)) * [1, 1, 0 if field.planar else 0.5]
+    points = points if targets is None else targets
     directions = random.normal(size=(field.photographs, 3))
     directions[:, 2] = np.abs(directions[:, 2]) + 0.7
     directions /= np.linalg.norm(directions, axis=1)[:, None]

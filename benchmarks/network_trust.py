@@ -1,6 +1,7 @@
 """Whether covariances, rejections and suspects are right: lenses, heavy tails, bars and control.
 
     python -m benchmarks.network --table lenses [--seed 301] [--runs 250]
+    python -m benchmarks.network --table still
     python -m benchmarks.network --table tails
     python -m benchmarks.network --table told
 
@@ -17,6 +18,7 @@ import numpy as np
 
 from ahf_ros.orientation.adjustment import adjust
 from ahf_ros.orientation.camera import PARAMETERS, project
+from ahf_ros.orientation.congruence import compare
 from ahf_ros.orientation.measurement import distances
 from ahf_ros.orientation.network import ControlPoint, Network, ScaleBar
 from ahf_ros.orientation.points import MeasuredPoints, entries
@@ -94,6 +96,23 @@ def _lenses(cameras: int, random: np.random.Generator) -> np.ndarray:
     middle = np.array([LENS[0], (WIDTH - 1) / 2, (HEIGHT - 1) / 2, *np.zeros(7)])
     lenses: np.ndarray = middle + signs * sizes * sigma
     return lenses
+
+
+def still_table(seeds: Sequence[int], runs: int) -> list[str]:
+    """Return how often two epochs without movement seem to have one; all but targets is new."""
+    alarms = np.zeros(2, int)
+    for run in progress(range(runs), 'pairs of epochs'):
+        random = np.random.default_rng([seeds[0], run])
+        targets = random.uniform(-1, 1, (40, 3)) * [1, 1, 0.5]
+        epochs = []
+        for _ in range(2):
+            lens = _lenses(1, random)
+            network, truth = simulate(Field(16, 40), random, lens, targets)
+            epochs.append(adjust(network, approximate(truth, random, 0.005)).measured_points)
+        found = compare(*epochs)
+        alarms += [not found.congruent, bool(found.moved)]
+    shares = [number(100 * it / runs, 1) for it in alarms]
+    return markdown(('pairs', 'false alarms %', 'with a target named %'), [(runs, *shares)])
 
 
 def tails_table(seeds: Sequence[int], runs: int) -> list[str]:

@@ -43,6 +43,7 @@ OFF_CENTRE = 0.02
 UNDETERMINED = 0.03
 """Standard deviation over the focal length that says nothing of it."""
 
+_FAR = 5.0  # standard deviations of a focal length that was given
 _ROLLED = np.deg2rad(60)  # between photographs that separate the principal point from poses
 _FACING = 0.5  # cosine between the axes of photographs whose roll is compared
 _COMPARED = 100  # photographs of a camera whose roll is compared, spread evenly
@@ -87,6 +88,16 @@ def undetermined(
         f'camera {network.cameras[place].name}: these photographs do not determine the focal '
         'length; take some tilted by 30 to 45 degrees against each other, or give a calibration'
         for place in np.flatnonzero(sigma > UNDETERMINED * np.abs(state.calibrations[:, 0]))
+    )
+
+
+def unlike_given(network: Network, calibrations: FloatArray) -> tuple[str, ...]:
+    """Return warnings of cameras whose focal length is far from the one that was given."""
+    return tuple(
+        f'camera {view.name}: its focal length is {found:.0f} px, and {view.focal_length:.0f} px '
+        'was given. Check Exif data, --focal-length and the size of the images'
+        for view, found in zip(network.cameras, calibrations[:, 0], strict=True)
+        if view.focal_length and abs(found / view.focal_length - 1) > _FAR * FOCAL_LENGTH
     )
 
 

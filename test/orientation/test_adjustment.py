@@ -494,6 +494,16 @@ def test_photographs_of_a_plane_straight_on_do_not_determine_the_focal_length():
     assert any('do not determine the focal length' in text for text in solution.warnings)
 
 
+def test_a_focal_length_that_was_given_wrongly_is_named(scene):
+    network, truth, start = scene
+    for given, named in ((1280.0, True), (3150.0, False)):
+        view = CameraView('camera', 4000, 3000, given)
+        solution = adjust(replace(network, cameras=(view,)), start)
+        assert solution.start.calibrations[0, 0] == pytest.approx(truth.calibrations[0, 0], abs=1)
+        text = 'focal length is 3200 px, and 1280 px was given'
+        assert any(text in it for it in solution.warnings) == named
+
+
 def test_a_fixed_camera_stays(scene):
     network, truth, start = scene
     view = CameraView('camera', 4000, 3000, calibration=truth.calibrations[0], fixed=True)
