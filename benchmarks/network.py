@@ -19,6 +19,7 @@ from benchmarks import (
     network_outliers,
     network_scale,
     network_starts,
+    network_trust,
 )
 from benchmarks.report import print_chosen
 
@@ -30,6 +31,10 @@ TABLES: dict[str, Callable[[int, int | None], list[str]]] = {
     'outliers': lambda seed, runs: network_outliers.table([seed], runs or 25),
     'scale': lambda seed, runs: network_scale.table([seed]),
     'panel': lambda seed, runs: network_starts.panel(),
+    'lenses': lambda seed, runs: network_trust.lenses_table([seed], runs or 250),
+    'still': lambda seed, runs: network_trust.still_table([seed], runs or 400),
+    'tails': lambda seed, runs: network_trust.tails_table([seed], runs or 1000),
+    'told': lambda seed, runs: network_trust.told_table([seed], runs or 500),
     'starts': lambda seed, runs: network_starts.starts_table([seed], runs or 250),
     'colmap': lambda seed, runs: network_colmap.table([seed]),
 }

@@ -23,7 +23,7 @@ def table(seeds: Sequence[int], runs: int = 125) -> list[str]:
     similarity of least squares.
     """
     lines = [
-        '| field | photographs | runs | parameters given % | released in stages % | sigma0 |',
+        '| field | photographs | runs | parameters given % | all, usual lenses % | sigma0 |',
         '|---|---|---|---|---|---|',
     ]
     for planar in (True, False):

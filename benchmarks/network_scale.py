@@ -18,7 +18,7 @@ SIZES = (125, 250, 500, 1000)
 def table(seeds: Sequence[int]) -> list[str]:
     """Return times of 200 targets, 80 in a photograph, as lines of Markdown."""
     lines = [
-        '| photographs | observations | parameters given, no tests, s | stages and tests, s '
+        '| photographs | observations | parameters given, no tests, s | all and tests, s '
         '| memory MB |',
         '|---|---|---|---|---|',
     ]

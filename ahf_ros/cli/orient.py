@@ -33,6 +33,9 @@ if TYPE_CHECKING:
 
 REPORT_FILE = 'report.html'
 
+CONTRADICTED = 3
+"""Exit status where all is written, and scale bars, control points or checks contradict it."""
+
 _LENGTH = re.compile(r'(?P<number>[0-9.]+(e[+-]?[0-9]+)?) *(?P<unit>px|mm)?', re.IGNORECASE)
 
 
@@ -123,6 +126,13 @@ def _add_object_arguments(group: argparse._ArgumentGroup) -> None:
         'control points, else inner.',
     )
 
+    group.add_argument(
+        '--keep-suspects',
+        action='store_true',
+        help='Use scale bars and control points that contradict the photographs all the same. '
+        'Without this they are named and left out.',
+    )
+
 
 def _add_observation_arguments(group: argparse._ArgumentGroup) -> None:
     text = 'Standard deviation of coordinates of image points without covariance, px.'
@@ -171,7 +181,9 @@ def run(options: argparse.Namespace) -> int:
         for number, it in enumerate(solutions)
     ]
     written = [_write(it, number, options) for number, it in enumerate(solutions)]
-    return int(not all(written))
+    if not all(written):
+        return 1
+    return CONTRADICTED if any(it.suspects for it in solutions) else 0
 
 
 def _network(options: argparse.Namespace) -> tuple[Network, list[str]]:
@@ -243,17 +255,24 @@ def _oriented(network: Network, options: argparse.Namespace) -> list[Solution]:
     from ahf_ros.orientation.orient import orient
     from ahf_ros.orientation.solution import separated
 
-    return separated(orient(network, datum=Datum(*options.datum) if options.datum else Datum()))
+    datum = Datum(*options.datum) if options.datum else Datum()
+    return separated(orient(network, datum, keep_suspects=options.keep_suspects))
 
 
 def _of_groups(solutions: Sequence[Solution], number: int) -> tuple[str, ...]:
-    """Return what a group is told of the others."""
-    if len(solutions) == 1:
-        return ()
-    return (
-        f'group {number + 1} of {len(solutions)} that have too few targets in common, each in a '
-        'frame of its own',
-    )
+    """Return that a group is one of several, and that its unit is unlikely."""
+    import numpy as np
+
+    from ahf_ros.orientation.units import unlikely
+
+    points = solutions[number].measured_points
+    notes = [unlikely(float(np.linalg.norm(np.ptp(points.xyz, axis=0))), points.unit)]
+    if len(solutions) > 1:
+        notes.append(
+            f'group {number + 1} of {len(solutions)} that have too few targets in common, each in '
+            'a frame of its own'
+        )
+    return tuple(it for it in notes if it)
 
 
 def _write(solution: Solution, number: int, options: argparse.Namespace) -> bool:
@@ -306,7 +325,8 @@ def print_network(solution: Solution, folder: str, console: Console | None = Non
     for index in solution.calibrated.nonzero()[0].tolist():
         rows = network_summary.camera_rows(solution, index)
         title = f'Camera {solution.network.cameras[index].name}'
-        print_table(title, ('parameter', 'value', 'standard deviation'), rows, console)
+        of_camera = 'parameter', 'value', 'standard deviation', 'ratio'
+        print_table(title, of_camera, rows, console)
     if bars := network_summary.bar_rows(solution):
         head = '', 'role', f'length, {unit}', 'deviation', 'sigma', 'ratio'
         print_table('Scale bars', head, bars, console)

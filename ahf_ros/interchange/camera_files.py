@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,6 +21,16 @@ from ahf_ros.text import reason_of, shown
 
 BROWN = ('', 'plumb_bob', 'rational_polynomial')
 """Models of distortion that are read; of the last one, only without a denominator."""
+
+_MORE = (
+    (slice(12, 14), 'a tilted sensor'),
+    (slice(8, 12), 'a thin prism'),
+    (slice(5, 8), 'the rational model'),
+)
+"""What further coefficients of OpenCV are for."""
+
+_KALIBR = {'radtan': 'plumb_bob', 'none': '', 'equidistant': 'equidistant'}
+"""Kalibr's models of distortion, as ROS calls them."""
 
 _COEFFICIENTS = ('k1', 'k2', 'p1', 'p2', 'k3')  # in the order of ROS and OpenCV
 _NAMES: Mapping[str, Sequence[str]] = {
@@ -55,11 +66,11 @@ class CameraFile:
 
 
 def read_camera(path: str | Path) -> CameraFile:
-    """Return the calibration in a file of ROS (camera_info) or of OpenCV (FileStorage).
+    """Return the calibration in a file of ROS (camera_info), OpenCV (FileStorage) or Kalibr.
 
     A ValueError names the file, and the field that is missing, damaged or of another model.
     """
-    content = _parsed(read_text(path), str(path))
+    content = _without_kalibr(_parsed(read_text(path), str(path)), path)
     width, height = (_whole(content, name, path) for name in ('width', 'height'))
     matrix = _numbers(content, 'matrix', path)
     distortion = _numbers(content, 'distortion', path, required=False)
@@ -77,9 +88,10 @@ def read_camera(path: str | Path) -> CameraFile:
             f"{path}: distortion_model is {shown(model)}, accepted is plumb_bob, Brown's"
         )
     if len(distortion) not in (0, 4, 5, 8, 12, 14) or any(distortion[5:]):
+        more = next((it for place, it in _MORE if any(distortion[place])), 'another model')
         raise ValueError(
-            f'{path}: distortion_coefficients are {distortion}, accepted are 4 or 5 numbers: '
-            'k1, k2, p1, p2, k3'
+            f'{path}: distortion_coefficients are {distortion}, those of {more}; accepted are 4 '
+            'or 5 numbers: k1, k2, p1, p2, k3'
         )
     value = dict.fromkeys(PARAMETERS, 0.0) | {'f': fy, 'cx': cx, 'cy': cy}
     value |= dict(zip(_COEFFICIENTS, distortion, strict=False))
@@ -182,6 +194,32 @@ def _parsed(text: str, path: str) -> dict[str, Any]:
     if not isinstance(content, dict):
         raise ValueError(f'{path} has no fields, accepted is a calibration of ROS or OpenCV')
     return content
+
+
+def _without_kalibr(content: dict[str, Any], path: str | Path) -> dict[str, Any]:
+    """Return the fields of ROS for a camera of Kalibr, any other content as it is."""
+    cameras = [it for it in content if re.fullmatch(r'cam[0-9]+', str(it))]
+    if not cameras:
+        return content
+    camera = content[cameras[0]]
+    if len(cameras) > 1:
+        raise ValueError(f'{path} has {", ".join(cameras)}, accepted is one camera a file')
+    if not isinstance(camera, dict) or camera.get('camera_model') != 'pinhole':
+        model = camera.get('camera_model') if isinstance(camera, dict) else None
+        raise ValueError(f'{path}: camera_model is {shown(model)}, accepted is pinhole')
+    intrinsics, size = (camera.get(it) for it in ('intrinsics', 'resolution'))
+    if not (isinstance(intrinsics, list) and len(intrinsics) == 4):
+        raise ValueError(f'{path}: intrinsics is {shown(intrinsics)}, accepted is fx, fy, cx, cy')
+    width, height = size if isinstance(size, list) and len(size) == 2 else (None, None)
+    fx, fy, cx, cy = intrinsics
+    model = camera.get('distortion_model', 'none')
+    return {
+        'image_width': width,
+        'image_height': height,
+        'camera_matrix': [fx, 0, cx, 0, fy, cy, 0, 0, 1],
+        'distortion_coefficients': camera.get('distortion_coeffs', []),
+        'distortion_model': _KALIBR.get(model, model),
+    }
 
 
 def _field(content: dict[str, Any], name: str) -> Any:

@@ -2,33 +2,32 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ahf_ros.blas import one_blas_thread
 from ahf_ros.orientation import normals
-from ahf_ros.orientation.calibration import released
+from ahf_ros.orientation.calibration import undetermined, unlike_given
 from ahf_ros.orientation.camera import PARAMETERS
 from ahf_ros.orientation.datum import Datum
+from ahf_ros.orientation.deviations import failed_checks, said
 from ahf_ros.orientation.knowledge import gathered, kind, knowledge
-from ahf_ros.orientation.least_squares import (
-    Knowledge,
-    minimise,
-    normal_equations,
-)
-from ahf_ros.orientation.network import FloatArray, IntArray, Network, Rejection, check_network
+from ahf_ros.orientation.least_squares import Knowledge, minimise
+from ahf_ros.orientation.network import FloatArray, IntArray, Network, check_network
 from ahf_ros.orientation.normals import Layout
 from ahf_ros.orientation.placing import placed
-from ahf_ros.orientation.precision import precision
 from ahf_ros.orientation.refinement import NEEDED, agreeing, free_parameters
 from ahf_ros.orientation.rejection import Adjusted, adjusted, rejections, relocated, tested
+from ahf_ros.orientation.similarity import similarity_between
 from ahf_ros.orientation.solution import Solution, Start
-from ahf_ros.orientation.testing import CRITICAL, UnitWeight, unit_weight
+from ahf_ros.orientation.suspects import examined
+from ahf_ros.orientation.testing import CRITICAL
 from ahf_ros.orientation.zoom import zoomed
 
-_CHECKED = 1e-6  # share of a variance that others must leave for a condition to be tested
+Mask = NDArray[np.bool_]
+_INNER = Datum('inner')
 _MISFIT = 3.0  # sigma0 that is no matter of weights
 _MISFITS = (
     'sigma0 is {:.1f}: image points fit so many times worse than their covariances say. Do not '
@@ -45,6 +44,7 @@ def adjust(
     test: bool = True,
     *,
     backward: bool = False,
+    keep_suspects: bool = False,
 ) -> Solution:
     """Adjust a network and return coordinates, poses and cameras with their covariances.
 
@@ -62,12 +62,15 @@ def adjust(
         The frame of the coordinates. Without one, that of control points where there are some,
         else inner constraints on all targets.
     release : tuple of str, optional
-        Names of `camera.PARAMETERS` that are estimated for each camera that is not fixed. Without
-        it, those that the network determines are released in stages.
+        Names of `camera.PARAMETERS` that are estimated for each camera that is not fixed, and
+        nothing else is known of. Without it, all are, beside what is usual of lenses.
     test : bool
-        Whether wrong observations are found and left out, and targets at two places.
+        Whether wrong image points, scale bars and control points are found and left out, and
+        targets at two places. Image points are tested by each other alone.
     backward : bool
         Whether distortion is a correction at the measured place, as DBAT and PhotoModeler have it.
+    keep_suspects : bool
+        Whether bars and control points that contradict the photographs are used all the same.
 
     Returns
     -------
@@ -112,8 +115,13 @@ def adjust(
     check_network(network)
     try:
         with one_blas_thread():
+            free = free_parameters(network, PARAMETERS if release is None else release)
+            lenses = start.calibrations if release is None else None
+            model = _Model(network, free, lenses, backward)
+            if test:
+                return _tested(model, start, datum or Datum(), keep_suspects)
             start, datum, warnings = placed(network, start, datum or Datum())
-            return _adjusted(network, start, datum, release, test, backward, warnings)
+            return _solution(network, model.adjusted(start, datum), warnings)
     except np.linalg.LinAlgError as error:
         raise ValueError(
             'the network is singular: the targets of a photograph, or all, lie on a line, or bars '
@@ -121,84 +129,94 @@ def adjust(
         ) from error
 
 
-def _adjusted(
-    network: Network,
-    start: Start,
-    datum: Datum,
-    release: tuple[str, ...] | None,
-    test: bool,
-    backward: bool,
-    warnings: tuple[str, ...],
-) -> Solution:
-    """Return the solution from approximate values in the frame of what is known."""
-    has_control = kind(network, datum) == 'control'
-    known_points = np.isin(
-        network.targets, [point.name for point in network.control if not point.check]
-    )
+@dataclass(frozen=True)
+class _Model:
+    """What is adjusted: a network, free parameters (cameras, parameters), and usual lenses."""
 
-    def lay_out(state: Start, free: NDArray[np.bool_]) -> Layout:
+    network: Network
+    free: Mask
+    lenses: FloatArray | None
+    backward: bool
+
+    def lay_out(self, state: Start, datum: Datum = _INNER) -> Layout:
+        """Return the layout of the used observations."""
+        control = {point.name for point in self.network.control if not point.check}
+        known = np.isin(self.network.targets, list(control))
         layout = normals.lay_out(
-            network,
+            self.network,
             state,
             state.used,
-            free,
-            known=known_points if has_control else None,
-            backward=backward,
+            self.free,
+            known=known if kind(self.network, datum) == 'control' else None,
+            backward=self.backward,
         )
         if not len(layout.xy):
             raise ValueError('start: nothing to adjust; ' + NEEDED)
         return layout
 
-    def known(layout: Layout) -> Knowledge:
-        return knowledge(layout, gathered(network, layout, datum))
+    def known(self, layout: Layout, datum: Datum = _INNER) -> Knowledge:
+        """Return what is known beside the photographs."""
+        return knowledge(layout, gathered(self.network, layout, datum, self.lenses))
 
-    def fit(free: NDArray[np.bool_], state: Start) -> tuple[Start, tuple[FloatArray, ...]]:
-        layout = lay_out(state, free)
-        fitted, _ = minimise(layout, state, known(layout), 'cauchy' if test else 'squares')
-        if test:
-            fitted = replace(fitted, used=agreeing(network, fitted, layout))
-            layout = lay_out(fitted, free)
-        covariance = precision(*normal_equations(layout, fitted, known(layout))).rest
-        spread = normals.robust_spread(normals.whitened_lengths(layout, fitted))
-        return fitted, _of_cameras(layout, max(1.0, spread) ** 2 * covariance)
-
-    if release is None:
-        free, state, of_cameras = released(network, start, fit)
-        warnings += of_cameras
-    else:
-        free, state = free_parameters(network, release), start
-    if test:
-        state, _ = fit(free, state)
-        layout = lay_out(state, free)
-        warnings += zoomed(network, layout, state)
+    def approximate(self, state: Start) -> tuple[Start, tuple[str, ...]]:
+        """Return values after a robust adjustment, and warnings of photographs of other zooms."""
+        layout = self.lay_out(state)
+        state, _ = minimise(layout, state, self.known(layout), 'cauchy')
+        state = replace(state, used=agreeing(self.network, state, layout))
+        layout = self.lay_out(state)
+        warnings = zoomed(self.network, layout, state)
         spread = max(1.0, normals.robust_spread(normals.whitened_lengths(layout, state)))
-        state = relocated(network, state, layout, spread)
-        result = tested(
-            network,
+        return relocated(self.network, state, layout, CRITICAL * spread), warnings
+
+    def adjusted(self, state: Start, datum: Datum) -> Adjusted:
+        """Return the adjustment in a datum."""
+        return adjusted(
+            self.network,
             state,
-            lambda now: lay_out(now, free),
-            known,
-            lambda done: weight(done).plausible,
+            lambda now: self.lay_out(now, datum),
+            lambda layout: self.known(layout, datum),
         )
-    else:
-        result = adjusted(network, state, lambda now: lay_out(now, free), known)
-    return _solution(network, datum, result, warnings, test)
 
 
-def weight(result: Adjusted) -> UnitWeight:
-    """Return the variance of unit weight of an adjustment, with its test."""
-    layout, conditions = result.layout, result.knowledge(result.state)
-    lengths = normals.whitened_lengths(layout, result.state)
-    unknowns = layout.unknowns + 6 * len(layout.photographs)
-    redundancy = layout.xy.size + len(conditions.gaps) - unknowns
-    return unit_weight(float((lengths**2).sum()) + conditions.cost, redundancy)
+def _tested(model: _Model, start: Start, datum: Datum, keep_suspects: bool) -> Solution:
+    """Return the solution: of photographs alone, then with what of the rest they believe."""
+    network = model.network
+    alone = replace(model, network=replace(network, bars=(), control=()))
+    state, warnings = alone.approximate(start)
+    images, critical = tested(alone.network, state, alone.lay_out, alone.known)
+    unit = images.unit
+    factor = 1.0 if unit.plausible else unit.sigma0**2
+    state, first, of_known = placed(network, images.state, datum)
+    rows = images.layout.points
+    points = state.points[rows]
+    movement = similarity_between(images.state.points[rows], points)
+    covariance = movement.turned(factor * images.precision.rest[: points.size, : points.size])
+    known = gathered(network, images.layout, first, checks=True)
+    checked = examined(network, known, points, covariance, keep_suspects)
+    state, datum, _ = placed(checked.network, images.state, datum)
+    seen = network.observations
+    weighted = replace(
+        checked.network, observations=replace(seen, covariance=factor * seen.covariance)
+    )
+    result = replace(model, network=weighted).adjusted(state, datum)
+    rejected, of_targets = rejections(network, result, critical / np.sqrt(factor))
+    warnings = of_known + checked.warnings + warnings + of_targets
+    solution = _solution(checked.network, result, warnings)
+    failed = failed_checks(solution, checked.suspects)
+    return replace(
+        solution,
+        sigma0=unit.sigma0,
+        scaled=not unit.plausible,
+        rejected=network.set_aside + rejected,
+        expected_rejections=images.tails.beyond(critical) * len(images.layout.xy),
+        suspects=checked.suspects + failed,
+        warnings=solution.warnings + said(failed, network.unit),
+    )
 
 
-def _solution(
-    network: Network, datum: Datum, result: Adjusted, warnings: tuple[str, ...], test: bool
-) -> Solution:
-    """Return an adjustment in the network's order, with what was rejected."""
-    layout, every, unit = result.layout, result.every, weight(result)
+def _solution(network: Network, result: Adjusted, warnings: tuple[str, ...]) -> Solution:
+    """Return an adjustment in the network's order."""
+    layout, every, unit = result.layout, result.every, result.unit
     factor = 1.0 if unit.plausible else unit.sigma0**2
     covariance = factor * result.precision.rest
     adjusted_points = np.isin(np.arange(len(network.targets)), layout.points)
@@ -211,10 +229,8 @@ def _solution(
     residuals[every.observations] = normals.residuals(every, result.state)
     normalised = np.full(len(residuals), np.nan)
     normalised[every.observations] = result.lengths / np.sqrt(factor)
-    rejected: tuple[Rejection, ...] = ()
-    if test:
-        rejected, of_targets = rejections(network, result)
-        warnings += of_targets + doubtful(network, result, datum, np.sqrt(factor))
+    warnings += undetermined(network, layout, result.state, covariance)
+    warnings += unlike_given(network, result.state.calibrations)
     if unit.sigma0 > _MISFIT:
         warnings += (_MISFITS.format(unit.sigma0),)
     if not result.converged:
@@ -239,34 +255,11 @@ def _solution(
         points,
         unit.sigma0,
         unit.redundancy,
-        network.set_aside + rejected,
+        network.set_aside,
         warnings,
         scaled=not unit.plausible,
         backward=layout.backward,
         converged=result.converged,
-    )
-
-
-def doubtful(network: Network, result: Adjusted, datum: Datum, sigma0: float) -> tuple[str, ...]:
-    """Return warnings of bars and control points whose tests fail; they are used all the same."""
-    known = gathered(network, result.layout, datum)
-    names = ['scale bar ' + '-'.join(bar.ends) for bar in known.bars]
-    names += [f'control point {point.name}' for point in known.control for _ in range(3)]
-    conditions = result.knowledge(result.state)
-    rows, gaps = conditions.rows[: len(names)], conditions.gaps[: len(names)]
-    variances = conditions.variances[: len(names)]
-    computed = ((rows @ result.precision.rest) * rows).sum(axis=1)
-    checked = variances - computed > _CHECKED * variances
-    with np.errstate(invalid='ignore', divide='ignore'):
-        tests = np.abs(gaps) / np.sqrt(variances - computed) / sigma0
-    failed = {
-        name: f'{gap:.4g} {network.unit}'.rstrip() + f', {size:.1f} standard deviations'
-        for name, gap, size, tested in zip(names, gaps, tests, checked, strict=True)
-        if tested and size > CRITICAL
-    }
-    return tuple(
-        f'{name} contradicts the rest: known minus adjusted {text}'
-        for name, text in failed.items()
     )
 
 

@@ -1,90 +1,103 @@
-"""Self-calibration: which parameters of a camera a network determines.
+"""What is usual of lenses: weak observations of their parameters beside the photographs.
 
-Parameters are released in stages [1]_. Those stay that are not correlated with others so much that
-neither means anything alone [2]_, and in the end those that differ significantly from what they
-were.
+All parameters of a camera are estimated together, however much they correlate: a parameter that
+is left out takes what it explains to others, and no covariance knows of it. What photographs do
+not determine is held by what is usual of lenses, whose variance enters the covariance of all
+results [1]_, [2]_.
 
 References
 ----------
-.. [1] Luhmann et al., Close-Range Photogrammetry and 3D Imaging, 3rd ed. 2020, 7.3.
-.. [2] Fraser, Digital camera self-calibration, ISPRS J. 52 (4), 1997, 149-159.
+.. [1] Förstner & Wrobel, Photogrammetric Computer Vision, Springer 2016, 4.2.7 and 15.4.
+.. [2] Luhmann et al., Close-Range Photogrammetry and 3D Imaging, 3rd ed. 2019, 4.4 and 7.3.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import replace
-
 import numpy as np
-from numpy.typing import NDArray
 
-from ahf_ros.orientation.camera import PARAMETERS, pinhole
-from ahf_ros.orientation.network import FloatArray, Network
+from ahf_ros.orientation.camera import known_calibration
+from ahf_ros.orientation.network import CameraView, FloatArray, IntArray, Network
+from ahf_ros.orientation.normals import Layout
 from ahf_ros.orientation.solution import Start
 
-STAGES = (('f',), ('k1',), ('cx', 'cy'), ('k2', 'p1', 'p2'), ('k3',), ('affinity', 'shear'))
+USUAL = {
+    'k1': 0.2,
+    'k2': 0.2,
+    'k3': 0.2,
+    'p1': 0.003,
+    'p2': 0.003,
+    'affinity': 0.001,
+    'shear': 0.001,
+}
+"""Standard deviations of what lenses have, about zero or what is given."""
 
-_SIGNIFICANT = 2.576  # standard deviations; 1 % error probability
-_CORRELATED = 0.95
-_FOCAL_LENGTH = 0.03  # standard deviation over the focal length that says nothing of it
+FOCAL_LENGTH = 0.05
+"""Relative standard deviation of a focal length that is given: makers round it."""
+
+UNKNOWN_FOCAL_LENGTH = 0.5
+"""The same of a focal length that is only an approximate value."""
+
+OFF_CENTRE = 0.02
+"""Standard deviation of a principal point about the centre, in widths of the image."""
+
+UNDETERMINED = 0.03
+"""Standard deviation over the focal length that says nothing of it."""
+
+_FAR = 5.0  # standard deviations of a focal length that was given
 _ROLLED = np.deg2rad(60)  # between photographs that separate the principal point from poses
 _FACING = 0.5  # cosine between the axes of photographs whose roll is compared
 _COMPARED = 100  # photographs of a camera whose roll is compared, spread evenly
 
-_RADIAL = [PARAMETERS.index(name) for name in ('k1', 'k2', 'k3')]
-_UNDETERMINED = (
-    'camera {}: these photographs do not determine the focal length, it stays as it was; take '
-    'some tilted by 30 to 45 degrees against each other, or give a calibration'
-)
 
-Mask = NDArray[np.bool_]
-Fit = Callable[[Mask, Start], tuple[Start, tuple[FloatArray, ...]]]
-"""Adjusts with free parameters (cameras, parameters): values and covariances of calibrations."""
+def usual_deviations(view: CameraView, focal_length: float) -> dict[str, float]:
+    """Return the standard deviations of what is usual of a camera, in the order of `PARAMETERS`.
 
-
-def released(network: Network, start: Start, fit: Fit) -> tuple[Mask, Start, tuple[str, ...]]:
-    """Return the free parameters (cameras, parameters), values to begin with, and warnings.
-
-    The focal length is released where its standard deviation is below 3 % of it, the principal
-    point only where photographs are rolled. What is not significant is found at the end, since a
-    parameter may be so only beside others.
+    Its focal length in px counts where none is given.
     """
-    free = np.zeros((len(network.cameras), len(PARAMETERS)), dtype=bool)
-    state, warnings = start, []
-    before = _known(network, start)
-    open_cameras = [place for place, view in enumerate(network.cameras) if not view.fixed]
-    for stage in (*STAGES, ()):
-        trial = free.copy()
-        for place in open_cameras:
-            if stage != ('cx', 'cy') or rolled(start.rotations[network.camera_of == place]):
-                trial[place, [PARAMETERS.index(name) for name in stage]] = True
-        if stage and (trial == free).all():
-            continue
-        fitted, covariances = fit(trial, state)
-        free = trial.copy()
-        for place in open_cameras:
-            change = fitted.calibrations[place] - before[place]
-            if stage == ('f',):
-                sigma = np.sqrt(covariances[place][0, 0])
-                free[place, 0] = sigma < _FOCAL_LENGTH * fitted.calibrations[place, 0]
-                if not free[place, 0]:
-                    warnings.append(_UNDETERMINED.format(network.cameras[place].name))
-            free[place] = _apart(change, covariances[place], free[place], significant=not stage)
-        if (free == trial).all():
-            state = fitted
-    kept = np.where(free, state.calibrations, before)
-    return free, replace(state, calibrations=kept), tuple(warnings)
+    given, off = known_calibration(view)[0], OFF_CENTRE * max(view.width, view.height)
+    f = FOCAL_LENGTH * given if np.isfinite(given) else UNKNOWN_FOCAL_LENGTH * focal_length
+    return {'f': float(f), 'cx': off, 'cy': off, **USUAL}
 
 
-def _known(network: Network, start: Start) -> FloatArray:
-    """Return calibrations as they were known; approximate values of a lens are not knowledge."""
-    return np.array(
-        [
-            pinhole(found[0], view.width, view.height)
-            if view.calibration is None
-            else view.calibration
-            for view, found in zip(network.cameras, start.calibrations, strict=True)
-        ]
+def usual(
+    network: Network, layout: Layout, approximate: FloatArray | None = None
+) -> tuple[IntArray, FloatArray, FloatArray]:
+    """Return columns (c,), usual values and standard deviations of free parameters of lenses.
+
+    What is given of a camera is usual of it. A focal length that is not given is near its
+    approximate value in `approximate` (cameras, parameters), or left open without one.
+    """
+    focal = np.full(len(network.cameras), np.nan) if approximate is None else approximate[:, 0]
+    middles = np.array([known_calibration(view) for view in network.cameras])
+    middles[:, 0] = np.where(np.isfinite(middles[:, 0]), middles[:, 0], focal)
+    sigmas = np.array(
+        [list(usual_deviations(*it).values()) for it in zip(network.cameras, focal, strict=True)]
+    )
+    columns = layout.columns
+    known = (columns >= 0) & np.isfinite(middles)
+    return columns[known], middles[known], sigmas[known]
+
+
+def undetermined(
+    network: Network, layout: Layout, state: Start, rest: FloatArray
+) -> tuple[str, ...]:
+    """Return warnings of cameras whose focal length is as uncertain as it was before."""
+    column = layout.columns[:, 0]
+    sigma = np.sqrt(np.pad(np.diag(rest), (0, 1))[column])
+    return tuple(
+        f'camera {network.cameras[place].name}: these photographs do not determine the focal '
+        'length; take some tilted by 30 to 45 degrees against each other, or give a calibration'
+        for place in np.flatnonzero(sigma > UNDETERMINED * np.abs(state.calibrations[:, 0]))
+    )
+
+
+def unlike_given(network: Network, calibrations: FloatArray) -> tuple[str, ...]:
+    """Return warnings of cameras whose focal length is far from the one that was given."""
+    return tuple(
+        f'camera {view.name}: its focal length is {found:.0f} px, and {view.focal_length:.0f} px '
+        'was given. Check Exif data, --focal-length and the size of the images'
+        for view, found in zip(network.cameras, calibrations[:, 0], strict=True)
+        if view.focal_length and abs(found / view.focal_length - 1) > _FAR * FOCAL_LENGTH
     )
 
 
@@ -99,32 +112,3 @@ def rolled(rotations: FloatArray) -> bool:
         relative[..., 1, 0] - relative[..., 0, 1], relative[..., 0, 0] + relative[..., 1, 1]
     )
     return bool(((relative[..., 2, 2] > _FACING) & (np.abs(roll) > _ROLLED)).any())
-
-
-def _apart(change: FloatArray, covariance: FloatArray, free: Mask, significant: bool) -> Mask:
-    """Return which free parameters (10,) stay: those that mean something beside each other.
-
-    Of two that are too much correlated, that of less significance goes, and if asked for all that
-    are not significant go, the least significant first. The others change as if it had been kept
-    fixed. The radial parameters are coefficients of one polynomial: their correlation means
-    nothing.
-    """
-    free = free.copy()
-    while True:
-        places = np.flatnonzero(free)
-        sigma = np.sqrt(np.diag(covariance)[places])
-        size = np.abs(change[places]) / sigma
-        size[places == 0] = np.inf  # a focal length of zero is no hypothesis
-        correlation = np.abs(covariance[np.ix_(places, places)] / np.outer(sigma, sigma))
-        radial = np.isin(places, _RADIAL)
-        correlation[np.outer(radial, radial) | np.eye(len(places), dtype=bool)] = 0
-        involved = correlation.max(axis=0, initial=0) > _CORRELATED
-        weak = involved | (significant & (size < _SIGNIFICANT))
-        weak[places == 0] = False
-        if not weak.any():
-            return free
-        left = places[np.argmin(np.where(weak, size, np.inf))]
-        gain = covariance[:, left] / covariance[left, left]
-        change = change - gain * change[left]
-        covariance = covariance - np.outer(gain, covariance[left])
-        free[left] = False

@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from ahf_ros.orientation.measurement import distances
 from ahf_ros.orientation.network import ControlPoint, FloatArray, ScaleBar
-from ahf_ros.orientation.points import blocks
-from ahf_ros.orientation.solution import Solution
+from ahf_ros.orientation.points import blocks, standard_deviations
+from ahf_ros.orientation.solution import Solution, Suspect
+from ahf_ros.orientation.testing import special
+
+_FAILED = 0.0027
+"""Error probability at which a check fails: 3 standard deviations."""
 
 
 @dataclass(frozen=True)
@@ -33,11 +38,16 @@ class BarDeviation:
 
 @dataclass(frozen=True)
 class ControlDeviation:
-    """A control point, computed minus known coordinates (3,), and their standard deviations."""
+    """A control point, computed minus known coordinates (3,), and their covariance (3, 3)."""
 
     point: ControlPoint
     deviation: FloatArray
-    sigma: FloatArray
+    covariance: FloatArray
+
+    @property
+    def sigma(self) -> FloatArray:
+        """Standard deviations in x, y and z."""
+        return standard_deviations(self.covariance)
 
 
 def bar_deviations(solution: Solution) -> list[BarDeviation]:
@@ -56,12 +66,46 @@ def control_deviations(solution: Solution) -> list[ControlDeviation]:
     points = solution.measured_points
     known = [it for it in solution.network.control if points.unit and it.name in points.names]
     rows = points.indices([it.name for it in known])
-    variances = np.diagonal(blocks(points.covariance)[rows], axis1=1, axis2=2)
     return [
         ControlDeviation(
             point,
             points.xyz[row] - point.xyz,
-            np.sqrt(np.maximum(own, 0) + point.check * np.diag(point.covariance)),
+            blocks(points.covariance)[row] + point.check * point.covariance,
         )
-        for point, row, own in zip(known, rows, variances, strict=True)
+        for point, row in zip(known, rows, strict=True)
     ]
+
+
+def failed_checks(solution: Solution, left_out: Sequence[Suspect] = ()) -> tuple[Suspect, ...]:
+    """Return the checks that fail, but for suspects that were left out."""
+    named = {it.name for it in left_out}
+    found = []
+    for bar in bar_deviations(solution):
+        statistic, gap = (bar.deviation / bar.sigma) ** 2, abs(bar.deviation)
+        found.append((bar.bar.check, bar.bar.title, 1, statistic, gap))
+    for it in control_deviations(solution):
+        statistic = float(it.deviation @ np.linalg.pinv(it.covariance) @ it.deviation)
+        gap = float(np.linalg.norm(it.deviation))
+        found.append((it.point.check, it.point.title, 3, statistic, gap))
+    return tuple(
+        Suspect(name, gap, gap / math.sqrt(statistic), probability, 'failed')
+        for check, name, freedom, statistic, gap in found
+        if check
+        and name not in named
+        and (probability := float(special().chdtrc(freedom, statistic))) < _FAILED
+    )
+
+
+def said(failed: Sequence[Suspect], unit: str) -> tuple[str, ...]:
+    """Return in words what it means that checks fail."""
+    return tuple(
+        f'check failed: {it.name} differs by {with_unit(it.gap, unit)}, '
+        f'{it.gap / it.sigma:.1f} standard deviations. Either it is wrong, or the scale and the '
+        'coordinates are, by as much'
+        for it in failed
+    )
+
+
+def with_unit(length: float, unit: str) -> str:
+    """Return a length with its unit."""
+    return f'{length:.3g} {unit}'.rstrip()

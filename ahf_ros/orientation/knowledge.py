@@ -15,6 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ahf_ros.orientation.calibration import usual
 from ahf_ros.orientation.datum import Datum, movements
 from ahf_ros.orientation.least_squares import Conditions, Knowledge
 from ahf_ros.orientation.network import ControlPoint, FloatArray, IntArray, Network, ScaleBar
@@ -25,6 +26,7 @@ _NO_VARIANCE = 1e-14  # of a direction, relative to the largest of the point
 _DETERMINED = (
     1e-6  # singular value of a movement that conditions determine, relative to the largest
 )
+_NOTHING = np.zeros(0, int), np.zeros(0), np.zeros(0)
 
 
 @dataclass(frozen=True)
@@ -33,7 +35,7 @@ class Known:
 
     `ends` (b, 2) and `control` (c,) are compact indices of points; `in_datum` those that hold the
     frame by inner constraints; `fixed` (origin, on the x axis, in the plane z = 0) that hold it
-    instead, if any.
+    instead, if any. `lenses` are columns, values and standard deviations of what is usual of them.
     """
 
     bars: tuple[ScaleBar, ...]
@@ -42,18 +44,34 @@ class Known:
     controlled: IntArray
     in_datum: IntArray
     fixed: IntArray | None
+    lenses: tuple[IntArray, FloatArray, FloatArray]
 
 
-def gathered(network: Network, layout: Layout, datum: Datum) -> Known:
-    """Return what the adjustment of a layout uses of bars and control points in a datum."""
+def gathered(
+    network: Network,
+    layout: Layout,
+    datum: Datum,
+    lenses: FloatArray | None = None,
+    *,
+    checks: bool = False,
+) -> Known:
+    """Return what the adjustment of a layout uses of bars and control points in a datum.
+
+    With approximate calibrations, `lenses`, what is usual of them is known as well; with
+    `checks`, they are there, too.
+    """
     index = {network.targets[target]: place for place, target in enumerate(layout.points)}
     bars = tuple(
-        bar for bar in network.bars if not bar.check and all(end in index for end in bar.ends)
+        bar
+        for bar in network.bars
+        if (checks or not bar.check) and all(end in index for end in bar.ends)
     )
     control: tuple[ControlPoint, ...] = ()
     if kind(network, datum) == 'control':
         control = tuple(
-            point for point in network.control if not point.check and point.name in index
+            point
+            for point in network.control
+            if (checks or not point.check) and point.name in index
         )
     return Known(
         bars,
@@ -62,6 +80,7 @@ def gathered(network: Network, layout: Layout, datum: Datum) -> Known:
         np.array([index[point.name] for point in control], dtype=int),
         np.array([index[name] for name in datum.targets or index if name in index], dtype=int),
         np.array([index[name] for name in datum.targets]) if datum.kind == 'fixed' else None,
+        usual(network, layout, lenses) if lenses is not None else _NOTHING,
     )
 
 
@@ -76,17 +95,25 @@ def knowledge(layout: Layout, known: Known) -> Knowledge:
 
     def conditions(state: Start) -> Conditions:
         points = state.points[layout.points]
-        parts = [_of_bars(known, points), _of_control(known, points)]
+        parts = [of_bars(known, points), of_control(known, points)]
         parts.append(_of_datum(known, points, np.concatenate([part[0] for part in parts])))
         rows, gaps, variances = (np.concatenate(columns) for columns in zip(*parts, strict=True))
-        wide = np.zeros((len(rows), layout.unknowns))
-        wide[:, : rows.shape[1]] = rows
-        return Conditions(wide, gaps, variances)
+        columns, middles, sigmas = known.lenses
+        wide = np.zeros((len(rows) + len(columns), layout.unknowns))
+        wide[: len(rows), : rows.shape[1]] = rows
+        wide[len(rows) + np.arange(len(columns)), columns] = 1
+        beside = middles - state.calibrations[layout.free][columns - 3 * len(layout.points)]
+        return Conditions(
+            wide,
+            np.concatenate([gaps, beside]),
+            np.concatenate([variances, sigmas**2]),
+            usual=len(columns),
+        )
 
     return conditions
 
 
-def _of_bars(known: Known, points: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+def of_bars(known: Known, points: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return rows, gaps and variances of scale bars at points (n, 3)."""
     first, second = known.ends.T
     difference = points[second] - points[first]
@@ -100,7 +127,7 @@ def _of_bars(known: Known, points: FloatArray) -> tuple[FloatArray, FloatArray, 
     return rows.reshape(len(rows), points.size), lengths - distance, variances
 
 
-def _of_control(known: Known, points: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+def of_control(known: Known, points: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return rows, gaps and variances of control points along the axes of their covariances."""
     rows = np.zeros((len(known.control), 3, *points.shape))
     gaps = np.zeros((len(known.control), 3))

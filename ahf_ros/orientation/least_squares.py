@@ -33,18 +33,27 @@ _TUNING = 3.0  # standard deviations at which robust weights fall
 class Conditions:
     """What is known beside image points, linearised: rows (c, u), gaps (c,) and variances (c,).
 
-    A gap is known minus computed. Rows of variance zero hold exactly.
+    A gap is known minus computed. Rows of variance zero hold exactly. The last rows may be only
+    what is `usual`, which says nothing of the precision of the rest.
     """
 
     rows: FloatArray
     gaps: FloatArray
     variances: FloatArray
+    usual: int = 0
 
     @property
     def cost(self) -> float:
         """Sum of weighted squares of the gaps that have a variance."""
         soft = self.variances > 0
         return float((self.gaps[soft] ** 2 / self.variances[soft]).sum())
+
+    @property
+    def measured(self) -> Conditions:
+        """The rows that have a variance and are not only usual."""
+        soft = self.variances > 0
+        soft[len(soft) - self.usual :] = False
+        return Conditions(self.rows[soft], self.gaps[soft], self.variances[soft])
 
     def added(self, equations: Normals) -> Normals:
         """Return normal equations with the rows that have a variance."""

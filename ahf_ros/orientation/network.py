@@ -47,6 +47,11 @@ class ScaleBar:
     sigma: float
     check: bool = False
 
+    @property
+    def title(self) -> str:
+        """What messages call it."""
+        return f'scale bar {"-".join(self.ends)}'
+
 
 @dataclass(frozen=True)
 class ControlPoint:
@@ -59,6 +64,11 @@ class ControlPoint:
     xyz: FloatArray
     covariance: FloatArray
     check: bool = False
+
+    @property
+    def title(self) -> str:
+        """What messages call it."""
+        return f'control point {self.name}'
 
 
 @dataclass(frozen=True)

@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from itertools import combinations
 
 import numpy as np
 
 from ahf_ros.blas import one_blas_thread
 from ahf_ros.orientation.adjustment import adjust
+from ahf_ros.orientation.calibration import UNDETERMINED
 from ahf_ros.orientation.datum import Datum
+from ahf_ros.orientation.lens_model import unsuitable_lenses
 from ahf_ros.orientation.network import FloatArray, IntArray, Network, once_a_photograph
 from ahf_ros.orientation.planar import principal_axes
 from ahf_ros.orientation.resection import FEWEST_POINTS
+from ahf_ros.orientation.similarity import in_principal_axes
 from ahf_ros.orientation.solution import Solution, Start
 from ahf_ros.orientation.start import FEWEST_PHOTOGRAPHS, oriented, reversal, starts
 from ahf_ros.orientation.triples import FEWEST_COMMON, known_calibrations
@@ -30,10 +34,6 @@ CONTRADICTING = 0.6
 Those of its targets in photographs that could not be oriented disagree.
 """
 
-FEWEST_OF_A_LENS = 5
-BELIEVED_LENS = 0.8
-"""Photographs, and the share of their observations that must agree, for a lens to be believed."""
-
 NAMED = 8
 """Photographs or targets that a message names."""
 
@@ -48,6 +48,8 @@ def orient(
     datum: Datum | None = None,
     release: tuple[str, ...] | None = None,
     test: bool = True,
+    *,
+    keep_suspects: bool = False,
 ) -> list[Solution]:
     """Orient photographs and compute targets without any approximate values, and adjust them.
 
@@ -61,6 +63,8 @@ def orient(
         Parameters of the cameras that are estimated, as for `adjust`.
     test : bool
         Whether wrong observations are found and left out.
+    keep_suspects : bool
+        Whether bars and control points that contradict the photographs are used, as for `adjust`.
 
     Returns
     -------
@@ -94,23 +98,24 @@ def orient(
     (1500.0, (60, 60))
     """
     with one_blas_thread():
-        return _oriented(once_a_photograph(network), datum, release, test)
+        return _oriented(
+            once_a_photograph(network),
+            partial(adjust, datum=datum, release=release, test=test, keep_suspects=keep_suspects),
+        )
 
 
-def _oriented(
-    network: Network, datum: Datum | None, release: tuple[str, ...] | None, test: bool
-) -> list[Solution]:
+def _oriented(network: Network, adjusted: Callable[[Network, Start], Solution]) -> list[Solution]:
     """Return the solutions of a network in which a target is once in a photograph."""
     _check(network)
     refused: list[str] = []
     solutions: list[Solution] = []
-    for start in starts(network):
+    for start in map(in_principal_axes, starts(network)):
         reason = _ambiguous(network, start)
         if reason is None:
-            solution = adjust(network, start, datum, release, test)
+            solution = adjusted(network, start)
             reason = _doubtful(solution)
         if reason is None:
-            warnings = solution.warnings + _lenses(solution)
+            warnings = solution.warnings + unsuitable_lenses(solution)
             solutions.append(replace(solution, warnings=warnings))
         else:
             refused.append(reason)
@@ -209,7 +214,9 @@ def _doubtful(solution: Solution) -> str | None:
         )
     known = known_calibrations(network)[:, 0]
     for camera in np.unique(network.camera_of[photographs]):
-        if not np.isfinite(known[camera]) and 'f' not in solution.released[camera]:
+        sigma = np.sqrt(solution.camera_covariances[camera][0, 0])
+        focal = start.calibrations[camera, 0]
+        if not np.isfinite(known[camera]) and not 0 < sigma < UNDETERMINED * focal:
             return (
                 f'camera {network.cameras[camera].name}: its focal length cannot be determined '
                 f'from {names}, which look in about the same direction. Give a calibration or a '
@@ -225,32 +232,6 @@ def _doubtful(solution: Solution) -> str | None:
             'targets moved'
         )
     return None
-
-
-def _lenses(solution: Solution) -> tuple[str, ...]:
-    """Return warnings of lenses that were estimated and hardly checked.
-
-    What such photographs do not determine of a lens stays zero, and no covariance knows of it.
-    """
-    network, start = solution.network, solution.start
-    posed = np.isfinite(start.positions[:, 0])
-    warnings = []
-    for camera, view in enumerate(network.cameras):
-        own = posed & (network.camera_of == camera)
-        estimated = set(solution.released[camera]) - {'f'}
-        if view.calibration is not None or not estimated or not own.any():
-            continue
-        belongs = own[network.observations.photograph]
-        share = float(np.mean(start.used[belongs]))
-        if own.sum() < FEWEST_OF_A_LENS or share < BELIEVED_LENS:
-            warnings.append(
-                f'camera {view.name}: its lens is estimated from {own.sum()} photographs, of '
-                f'whose observations {share:.0%} agree. Coordinates may be off by many of their '
-                'standard deviations. Give a calibration, or take '
-                f'{FEWEST_OF_A_LENS} photographs or more: '
-                f'{TILT}'
-            )
-    return tuple(warnings)
 
 
 def _left_out(network: Network, solutions: Sequence[Solution]) -> tuple[str, ...]:

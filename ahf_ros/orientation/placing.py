@@ -7,19 +7,20 @@ other units, mirrored axes, exchanged names. Small ones are left to the tests of
 from __future__ import annotations
 
 from collections.abc import Iterator
-from itertools import combinations
+from itertools import combinations, islice
 
 import numpy as np
 
 from ahf_ros.orientation.datum import Datum
 from ahf_ros.orientation.knowledge import kind
-from ahf_ros.orientation.network import FloatArray, Network
+from ahf_ros.orientation.network import FloatArray, IntArray, Network
 from ahf_ros.orientation.similarity import Similarity, on_a_line, similarity_between
 from ahf_ros.orientation.solution import Start
 from ahf_ros.text import listed
 
 _MISFIT = 0.15  # of control points, relative to their extent, that no approximate value explains
 _STRETCH = 1.2  # ratio of lengths that none explains
+_MOST_TRIPLES = 300
 _NARROW = 1e-3  # extent across a line of targets that hold no frame, relative to that along it
 _UNITS = (10, 100, 1000, 25.4, 304.8)
 
@@ -43,7 +44,7 @@ def placed(network: Network, start: Start, datum: Datum) -> tuple[Start, Datum, 
     here = np.array([_at(start, index, point.name) for point in seen]).reshape(-1, 3)
     if len(seen) >= 3:
         _check_control(tuple(point.name for point in seen), here, known)
-        start = similarity_between(here, known).in_frame(start)
+        start = _similarity_of_most(here, known).in_frame(start)
     elif seen and datum.kind == 'control':
         warnings.append(
             f'control: {len(seen)} points hold no frame, inner constraints hold the rest of it'
@@ -91,15 +92,13 @@ def _scaled(
         return start, tuple(warnings)
     usual = 1.0 if scaled else float(np.median(ratios))
     wrong = [place for place, ratio in enumerate(ratios) if _stretch(ratio / usual) > _STRETCH]
-    if wrong:
+    if unit := _unit([ratios[place] / usual for place in wrong]):
         others = 'control points' if scaled else 'other scale bars'
         each = ', '.join(
             f'{names[place]} is {ratios[place] / usual:.4g} times as long as the {others} say'
             for place in wrong
         )
-        raise ValueError(
-            f'scale bars contradict: {each}{_unit([ratios[p] / usual for p in wrong])}'
-        )
+        raise ValueError(f'scale bars contradict: {each}{unit}')
     if not scaled:
         start = Similarity(scale=usual).in_frame(start)
     return start, tuple(warnings)
@@ -111,62 +110,82 @@ def _stretch(ratio: float) -> float:
 
 
 def _unit(ratios: list[float]) -> str:
-    """Return a hint where all ratios are that of two units of length."""
+    """Return a hint where all ratios, if there are any, are that of two units of length."""
     for unit in _UNITS:
-        if all(_stretch(_stretch(ratio) / unit) < _STRETCH for ratio in ratios):
+        if ratios and all(_stretch(_stretch(ratio) / unit) < _STRETCH for ratio in ratios):
             return f'; a factor of {unit:g}: expected all lengths in one unit'
     return ''
 
 
+def _similarity_of_most(here: FloatArray, known: FloatArray) -> Similarity:
+    """Return the movement of points here (n, 3) to known ones that fits more than half of them.
+
+    Of triples, the one is taken whose median distance is least (Rousseeuw and Leroy 1987, p. 197).
+    """
+    triples = np.array(list(islice(combinations(range(len(here)), 3), _MOST_TRIPLES)))
+    most = min(len(here), len(here) // 2 + 2)
+
+    def nearest(chosen: IntArray) -> tuple[float, IntArray]:
+        moved = similarity_between(here[chosen], known[chosen]).moved(here)
+        distances = np.linalg.norm(moved - known, axis=1)
+        order = np.argsort(distances, kind='stable')[:most]
+        return float(distances[order[-1]]), order
+
+    able = [it for it in triples if not on_a_line(here[it], _NARROW)] or [np.arange(len(here))]
+    best = min((nearest(it) for it in able), key=lambda pair: pair[0])[1]
+    return similarity_between(here[best], known[best])
+
+
 def _check_control(names: tuple[str, ...], here: FloatArray, known: FloatArray) -> None:
-    """Raise `ValueError` if no similarity brings points here (n, 3) near the known ones."""
-    if _misfit(here, known) < _MISFIT:
+    """Raise `ValueError` if no similarity brings most points here (n, 3) near the known ones.
+
+    It does so, too, where an exchange or another unit explains those that are far.
+    """
+    far = _deviations(_similarity_of_most(here, known), here, known) >= _MISFIT
+    if not far.any():
         return
     if len(names) > 3 and _misfit(here * [1, 1, -1], known) < _MISFIT:
         raise ValueError(
             'control points are mirrored, expected right-handed axes: change the sign of one axis '
             'or exchange two'
         )
-    for explanation, changed_here, changed in _explanations(names, here, known):
-        if _misfit(changed_here, changed) < _MISFIT:
+    for explanation, changed in _explanations(names, known):
+        if _misfit(here, changed) < _MISFIT:
             raise ValueError(f'control points contradict the photographs: {explanation}')
-    raise ValueError(
-        f'control points contradict the photographs: {listed(names)} do not have the shape '
-        'of the network, whatever pair is exchanged or point left out; expected the coordinates '
-        'of these IDs'
-    )
+    if len(names) < 4 or far.sum() > (len(names) - 1) // 2:
+        raise ValueError(
+            f'control points contradict the photographs: {listed(names)} do not have the shape '
+            'of the network, whatever pair is exchanged; expected the coordinates of these IDs'
+        )
 
 
-def _explanations(
-    names: tuple[str, ...], here: FloatArray, known: FloatArray
-) -> Iterator[tuple[str, FloatArray, FloatArray]]:
-    """Yield what may be wrong, with points here and known ones as they then are.
+def _explanations(names: tuple[str, ...], known: FloatArray) -> Iterator[tuple[str, FloatArray]]:
+    """Yield what may be wrong, with known points as they then are.
 
-    Three points in any order have a similar triangle only by chance, so an exchange is seen of
-    three points, one that is alone wrong of four.
+    Three points in any order have a similar triangle only by chance.
     """
     for unit in _UNITS:
         for place in range(len(names)):
             for factor in (unit, 1 / unit):
                 changed = known.copy()
                 changed[place] *= factor
-                yield f'{names[place]} is in another unit (factor {unit:g})', here, changed
+                yield f'{names[place]} is in another unit (factor {unit:g})', changed
     for first, second in combinations(range(len(names)), 2):
         changed = known.copy()
         changed[[first, second]] = known[[second, first]]
-        yield f'{names[first]} and {names[second]} are exchanged', here, changed
-    if len(names) > 3:
-        for place, name in enumerate(names):
-            rest = np.arange(len(names)) != place
-            yield f'{name} alone does not fit the others', here[rest], known[rest]
+        yield f'{names[first]} and {names[second]} are exchanged', changed
 
 
 def _misfit(here: FloatArray, known: FloatArray) -> float:
     """Return the largest deviation after a similarity, relative to the known points' extent."""
-    moved = similarity_between(here, known).moved(here)
-    deviations = np.linalg.norm(moved - known, axis=1)
+    return float(_deviations(similarity_between(here, known), here, known).max())
+
+
+def _deviations(movement: Similarity, here: FloatArray, known: FloatArray) -> FloatArray:
+    """Return the deviations (n,) after a movement, relative to the known points' extent."""
     extent = np.sqrt(((known - known.mean(axis=0)) ** 2).sum(axis=1).mean())
-    return float(deviations.max() / extent) if extent > 0 else np.inf
+    deviations = np.linalg.norm(movement.moved(here) - known, axis=1)
+    return deviations / extent if extent > 0 else np.full(len(here), np.inf)
 
 
 def _turned(start: Start, known: FloatArray, here: FloatArray) -> Start:

@@ -29,6 +29,8 @@ def precision(reduced: Reduced, border: FloatArray) -> Precision:
     unknowns = len(reduced.matrix)
     inverse = np.linalg.inv(bordered(reduced, border)[0])[:unknowns, :unknowns]
     rest = reduced.scale[:, None] * (inverse + inverse.T) / 2 * reduced.scale
+    held = border[:, (border != 0).sum(axis=0) == 1].any(axis=1)
+    rest[held], rest[:, held] = 0.0, 0.0  # exactly: rounding would make variances below zero
     factor = np.linalg.inv(reduced.factor)
     transposed = factor.transpose(0, 2, 1)
     by_rest = -transposed @ reduced.half

@@ -11,10 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ahf_ros.orientation import normals
-from ahf_ros.orientation.camera import PARAMETERS, known_calibration
+from ahf_ros.orientation.calibration import usual
+from ahf_ros.orientation.camera import PARAMETERS
 from ahf_ros.orientation.datum import movements
 from ahf_ros.orientation.least_squares import Conditions, Knowledge, minimise
-from ahf_ros.orientation.network import FloatArray, IntArray, Network
+from ahf_ros.orientation.network import Network
 from ahf_ros.orientation.normals import Layout
 from ahf_ros.orientation.solution import Start
 
@@ -23,16 +24,6 @@ NEEDED = (
     'no used observation has a pose and a point in front of it, expected photographs with three '
     'points and points with two rays'
 )
-
-
-USUAL = {'k1': 0.2, 'k2': 0.2, 'k3': 0.2, 'p1': 0.003, 'p2': 0.003}
-"""Standard deviations of what lenses have, about zero."""
-
-FOCAL_LENGTH = 0.05
-"""Relative standard deviation of a focal length that is given: makers round it."""
-
-OFF_CENTRE = 0.02
-"""Standard deviation of a principal point about the centre, in widths of the image."""
 
 
 def refine(
@@ -85,7 +76,7 @@ def usual_lens(network: Network, layout: Layout) -> Knowledge:
 
     So few photographs never make a lens that does not exist.
     """
-    columns, middles, sigmas = _expected(network, layout)
+    columns, middles, sigmas = usual(network, layout)
 
     def conditions(state: Start) -> Conditions:
         rows = np.zeros((7 + len(columns), layout.unknowns))
@@ -97,22 +88,3 @@ def usual_lens(network: Network, layout: Layout) -> Knowledge:
         )
 
     return conditions
-
-
-def _expected(network: Network, layout: Layout) -> tuple[IntArray, FloatArray, FloatArray]:
-    """Return columns, expected values and standard deviations of free parameters of lenses.
-
-    What is given of a camera is expected of it.
-    """
-    expected = []
-    for camera, column in zip(network.cameras, layout.columns, strict=True):
-        middle = known_calibration(camera)
-        off = OFF_CENTRE * max(camera.width, camera.height)
-        sigmas = USUAL | {'f': FOCAL_LENGTH * middle[0], 'cx': off, 'cy': off}
-        expected += [
-            (column[place], middle[place], sigmas[name])
-            for place, name in enumerate(PARAMETERS)
-            if column[place] >= 0 and np.isfinite(sigmas.get(name, np.nan))
-        ]
-    columns, middles, deviations = np.array(expected).reshape(-1, 3).T
-    return columns.astype(int), middles, deviations

@@ -8,6 +8,7 @@ whatever the adjustment thought of each.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from itertools import combinations
@@ -20,9 +21,19 @@ from ahf_ros.orientation import camera, normals
 from ahf_ros.orientation.least_squares import Knowledge, minimise, normal_equations
 from ahf_ros.orientation.network import FloatArray, Network, Rejection
 from ahf_ros.orientation.normals import Layout
-from ahf_ros.orientation.precision import Precision, precision
+from ahf_ros.orientation.precision import Precision, of_computed, precision
 from ahf_ros.orientation.solution import Start
-from ahf_ros.orientation.testing import CRITICAL, normalised, worst
+from ahf_ros.orientation.testing import (
+    CRITICAL,
+    SIGNIFICANCE,
+    Tails,
+    UnitWeight,
+    normalised,
+    special,
+    tails,
+    unit_weight,
+    worst,
+)
 from ahf_ros.orientation.triangulation import SMALLEST_ANGLE, directions
 
 _MOST_PAIRS = 400  # of rays that are tried, spread evenly
@@ -33,7 +44,6 @@ _ROUNDS = 60  # of tests; each takes off one observation of a photograph and a t
 _SUSPECT = (
     0.25  # share of a target's rays that disagree, from which on a second place is looked for
 )
-_SECOND_PLACE = 3  # rays that meet at it, unless all that are off do
 Mask = NDArray[np.bool_]
 LayOut = Callable[[Start], Layout]
 """Lays out the used observations of a state."""
@@ -108,8 +118,7 @@ class Adjusted:
     """An adjustment: its layout, values and precision for unit weights, and how it was tested.
 
     `every` is the layout of all observations between its photographs and points, `lengths` their
-    normalised residuals by `spread`, the standard deviation of unit weight that they were tested
-    with.
+    normalised residuals, and `share` (m,) how many coordinates of each the unknowns explain.
     """
 
     layout: Layout
@@ -119,8 +128,22 @@ class Adjusted:
     every: Layout
     used: Mask
     lengths: FloatArray
-    spread: float
+    share: FloatArray
     converged: bool
+
+    @property
+    def unit(self) -> UnitWeight:
+        """The variance of unit weight of what was measured, with its test."""
+        measured = self.knowledge(self.state).measured
+        known = ((measured.rows @ self.precision.rest) * measured.rows).sum(axis=1)
+        lengths = normals.whitened_lengths(self.layout, self.state)
+        redundancy = (2 - self.share[self.used]).sum() + (1 - known / measured.variances).sum()
+        return unit_weight(float((lengths**2).sum()) + measured.cost, round(redundancy))
+
+    @property
+    def tails(self) -> Tails:
+        """The distribution of the normalised residuals of used observations."""
+        return tails(self.lengths[self.used])
 
 
 def adjusted(
@@ -135,41 +158,38 @@ def adjusted(
     every = normals.extended(network, layout)
     used = np.isin(every.observations, layout.observations)
     design = normals.linearise(every, state)
-    lengths = normalised(every, state, design, covariances, used)
-    spread = normals.robust_spread(lengths[used & np.isfinite(lengths)])
-    return Adjusted(layout, state, knowledge, covariances, every, used, lengths, spread, converged)
+    computed = of_computed(every, design, covariances)
+    lengths = normalised(every, state, design, computed, used)
+    share = np.trace(computed, axis1=1, axis2=2)
+    return Adjusted(layout, state, knowledge, covariances, every, used, lengths, share, converged)
 
 
 def tested(
-    network: Network,
-    state: Start,
-    lay_out: LayOut,
-    known: Callable[[Layout], Knowledge],
-    plausible: Callable[[Adjusted], bool],
-) -> Adjusted:
-    """Return the adjustment after Baarda's tests, observations off and on until none changes.
+    network: Network, state: Start, lay_out: LayOut, known: Callable[[Layout], Knowledge]
+) -> tuple[Adjusted, float]:
+    """Return the adjustment after Baarda's tests, and the residual from which on one fails them.
 
-    Residuals are tested with unit weights, or with the robust variance of unit weight where 1 is
-    not plausible. An observation comes on again once.
+    Residuals are tested with unit weights, or where 1 is not plausible with the variance that
+    they have, and the worst of each photograph and target is off first. An observation comes on
+    again once.
     """
     returned = np.zeros(len(network.observations.xy), dtype=bool)
     for _ in range(_ROUNDS):
         result = adjusted(network, state, lay_out, known)
-        if plausible(result):
-            result = replace(result, spread=1.0)
-        every, lengths = result.every, result.lengths / result.spread
-        off = worst(every, np.where(lengths > CRITICAL, lengths, 0), result.used)
-        on = ~result.used & (lengths < CRITICAL) & ~returned[every.observations]
+        every, lengths = result.every, result.lengths
+        critical = CRITICAL * (1.0 if result.unit.plausible else result.tails.deviation)
+        off = worst(every, np.where(lengths > critical, lengths, 0), result.used)
+        on = ~result.used & (lengths < critical) & ~returned[every.observations]
         if not (off.any() or on.any()):
             break
         returned[every.observations[on]] = True
         used = np.zeros(len(returned), dtype=bool)
         used[every.observations[(result.used & ~off) | on]] = True
         state = replace(result.state, used=used)
-    return result
+    return result, critical
 
 
-def relocated(network: Network, state: Start, layout: Layout, spread: float) -> Start:
+def relocated(network: Network, state: Start, layout: Layout, tolerance: float) -> Start:
     """Return values in which each suspect target is where most of its rays meet.
 
     Suspect is a target of which a quarter of the rays disagrees: it may lie between two places, or
@@ -178,7 +198,6 @@ def relocated(network: Network, state: Start, layout: Layout, spread: float) -> 
     everything = np.ones(len(network.observations.xy), dtype=bool)
     wider = replace(layout, points=np.arange(len(network.targets)))
     every = normals.extended(network, wider)
-    tolerance = CRITICAL * spread
     points, used = state.points.copy(), state.used & everything
     agrees = state.used[every.observations]
     rays = np.bincount(every.point, minlength=len(points))
@@ -193,20 +212,20 @@ def relocated(network: Network, state: Start, layout: Layout, spread: float) -> 
 
 
 def rejections(
-    network: Network, result: Adjusted
+    network: Network, result: Adjusted, critical: float
 ) -> tuple[tuple[Rejection, ...], tuple[str, ...]]:
     """Return what is off with its reason, and warnings of targets at two places."""
     every, state = result.every, result.state
-    lengths = result.lengths / result.spread
     reasons: dict[int, str] = {}
     warnings = []
-    tolerance = CRITICAL * result.spread
     off = np.flatnonzero(~result.used)
-    for target in np.unique(every.point[off]):
+    targets, wrong = np.unique(every.point[off], return_counts=True)
+    level = SIGNIFICANCE / max(int((wrong > 1).sum()), 1)
+    for target in targets:
         rows = off[every.point[off] == target]
-        for place in places(every, state, rows, tolerance):
-            if len(place.rows) < min(_SECOND_PLACE, len(rows)):
-                continue  # two of many wrong rays meet somewhere by chance
+        for place in places(every, state, rows, critical):
+            if _by_chance(every, state, place, rows) > level:
+                continue
             moved = place.point - state.points[every.points[target]]
             name = network.targets[every.points[target]]
             distance = f'{np.linalg.norm(moved):.4g} {network.unit}'.strip()
@@ -220,7 +239,7 @@ def rejections(
                 f'in {kept} photographs, at the other in {len(place.rows)}'
             )
     for row in off:
-        other = _other_target(every, state, int(row), tolerance)
+        other = _other_target(every, state, int(row), critical)
         if other is not None:
             reasons[int(row)] = f'wrong ID: the place of target {network.targets[other]}'
     rejected = [
@@ -228,7 +247,7 @@ def rejections(
             network,
             int(every.observations[row]),
             reasons.get(int(row), 'does not fit the other photographs'),
-            float(lengths[row]),
+            float(result.lengths[row]),
         )
         for row in off
     ]
@@ -239,11 +258,30 @@ def rejections(
     return tuple(rejected), tuple(warnings)
 
 
+def _by_chance(every: Layout, state: Start, place: Place, rows: NDArray[np.int64]) -> float:
+    """Return how often some of a target's wrong rays meet so well at one place by chance.
+
+    A shift of the target explains three of the coordinates of their residuals, and more than three
+    of any that are wrong by chance only if they come from another place: an F-test, made for each
+    choice of as many rays.
+    """
+    free = 2 * len(place.rows) - 3
+    targets = state.points[every.points[every.point[place.rows]]]
+    here, there = (
+        float((normals.lengths_at(every, state, place.rows, points) ** 2).sum())
+        for points in (targets, np.tile(place.point, (len(place.rows), 1)))
+    )
+    ratio = (here - there) / 3 / max(there / free, np.finfo(float).tiny)
+    choices = math.comb(len(rows), len(place.rows))
+    return choices * float(special().fdtrc(3, free, max(ratio, 0.0)))
+
+
 def _other_target(every: Layout, state: Start, row: int, tolerance: float) -> int | None:
     """Return the index of another target whose image is where a row was measured, if any."""
     points = state.points[every.points]
     rows = np.full(len(points), row)
     lengths = normals.lengths_at(every, state, rows, points)
+    lengths[every.point[row]] = np.inf
     nearest = int(lengths.argmin())
     return int(every.points[nearest]) if lengths[nearest] < tolerance else None
 

@@ -60,3 +60,19 @@ def on_a_line(xyz: FloatArray, flat: float = FLAT) -> bool:
     """Return whether points (n, 3) are on a line, or in one place."""
     values = np.linalg.svd(xyz - xyz.mean(axis=0), compute_uv=False)
     return len(xyz) < 3 or bool(values[1] <= flat * values[0])
+
+
+def in_principal_axes(start: Start) -> Start:
+    """Return values in the frame of the points' centroid and principal axes, the longest first.
+
+    The cameras are above the plane z = 0, and the target furthest along x has a positive x.
+    """
+    points = start.points[np.isfinite(start.points[:, 0])]
+    centre = points.mean(axis=0)
+    axes = np.linalg.svd(points - centre, full_matrices=False)[2]
+    towards = np.nanmean(start.positions, axis=0) - centre
+    along = (points - centre) @ axes[0]
+    x = axes[0] * np.sign(along[np.abs(along).argmax()])
+    z = axes[2] * np.sign(axes[2] @ towards or 1.0)
+    rotation = np.stack([x, np.cross(z, x), z])
+    return Similarity(rotation, -rotation @ centre).in_frame(start)

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,6 +36,23 @@ class Start:
     """(points, 3)."""
     used: NDArray[np.bool_]
     """(observations,) those that agree with these values."""
+
+
+@dataclass(frozen=True)
+class Suspect:
+    """A bar or point that contradicts what else is known, or a check that fails.
+
+    `gap` is how far it differs from what the rest says, `sigma` the standard deviation of that,
+    `probability` how often chance alone makes one so large among as many. `rivals` are those of
+    which one may be wrong instead.
+    """
+
+    name: str
+    gap: float
+    sigma: float
+    probability: float
+    verdict: Literal['left out', 'kept', 'unclear', 'failed']
+    rivals: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -67,6 +85,10 @@ class Solution:
     backward: bool = False
     """Whether distortion is a correction at the measured place; see `camera`."""
     converged: bool = True
+    suspects: tuple[Suspect, ...] = ()
+    """Bars and points that contradict the rest, and checks that fail."""
+    expected_rejections: float = 0.0
+    """Image points that chance alone would reject."""
 
     def check_forward(self) -> None:
         """Raise a ValueError if its distortion is backward, which files do not tell apart."""
@@ -133,6 +155,8 @@ def part(solution: Solution, photographs: Mask, targets: Mask) -> Solution:
     """Return a solution with some of its photographs and targets; cameras stay as they are."""
     start = solution.start
     network, rows = part_of(solution.network, np.flatnonzero(photographs), np.flatnonzero(targets))
+    if not network.bars and not network.control:
+        network = replace(network, unit='')
     entries = np.repeat(targets, 3)
     return replace(
         solution,

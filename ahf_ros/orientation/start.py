@@ -43,6 +43,9 @@ values stay as good as after each single one, in a quarter of the time."""
 FEWEST_PHOTOGRAPHS = 3
 """What two photographs say is checked by nothing."""
 
+AGREES = 0.9
+"""Share of observations that agree in a network that needs no other seed."""
+
 ONE_MINIMUM = np.radians(0.5)
 """Networks most of whose photographs are turned against each other by less are the same."""
 
@@ -95,7 +98,10 @@ def reversal(network: Network, start: Start) -> tuple[Start, float]:
 
 
 def _largest(network: Network, views: Sequence[View], among: Sequence[int]) -> Start | None:
-    """Return what grows largest of the best seeds, of several equally large ones the best."""
+    """Return what grows largest of the best seeds, of several equally large ones the best.
+
+    Where a second seed agrees about as many photographs, others are not tried.
+    """
     best: tuple[float, float] | None = None
     result: Start | None = None
     for seed in islice(seeds(network, views, among), MOST_SEEDS):
@@ -105,10 +111,12 @@ def _largest(network: Network, views: Sequence[View], among: Sequence[int]) -> S
         lengths = lengths_of(network, start)
         number = len(oriented(start))
         rating = (-number, spread_of(lengths) / max(float(np.mean(start.used)), 1e-9))
+        known = ~np.isnan(lengths)
+        agrees = np.mean(start.used[known]) > AGREES
+        again = best is not None and -best[0] == number
         if best is None or rating < best:
             best, result = rating, start
-        known = ~np.isnan(lengths)
-        if number == len(among) and np.mean(start.used[known]) > 0.9:
+        if agrees and (again or number == len(among)):
             break
     return result
 

@@ -9,6 +9,8 @@ References
 ----------
 .. [1] Baarda, A testing procedure for use in geodetic networks, Netherlands Geodetic Commission
    1968; Förstner & Wrobel, Photogrammetric Computer Vision, 2016, 4.6.4.
+.. [2] Lange, Little & Taylor, Robust statistical modeling using the t distribution, J. Am. Stat.
+   Assoc. 84 (1989), 881-896; the likelihood is that of a distribution which ends at the longest.
 """
 
 from __future__ import annotations
@@ -23,7 +25,6 @@ from numpy.typing import NDArray
 from ahf_ros.extras import need
 from ahf_ros.orientation.network import FloatArray
 from ahf_ros.orientation.normals import BEHIND, Design, Layout, whitened_lengths
-from ahf_ros.orientation.precision import Precision, of_computed
 from ahf_ros.orientation.solution import Start
 
 CRITICAL = 4.7
@@ -31,6 +32,15 @@ CRITICAL = 4.7
 
 SIGNIFICANCE = 0.05
 """Error probability of the test of the variance of unit weight."""
+
+BY_CHANCE = 0.001
+"""Error probability at which something that was told, or a second place, is named."""
+
+_NORMAL = 1e4  # degrees of freedom of what is as good as normal
+_FREEDOMS = (3.0, 3.5, 4.0, 5.0, 6.0, 8.0, 12.0, 20.0, 40.0, _NORMAL)
+_SCALES = np.linspace(0.85, 1.15, 31)  # that are tried, in those that the median has
+_ENOUGH = 5000  # lengths that determine a distribution
+_CLEARLY = 4.0  # log likelihood by which heavier tails must be better
 
 _CHECKED = 1e-9  # share of a residual that must be left by the adjustment for it to be tested
 
@@ -60,15 +70,57 @@ def unit_weight(cost: float, redundancy: int) -> UnitWeight:
     return UnitWeight(float(np.sqrt(cost / redundancy)), redundancy, bool(low <= cost <= high))
 
 
+class Tails(NamedTuple):
+    """How residuals are spread: a t-distribution in the plane, of a scale and degrees of freedom.
+
+    Its lengths r exceed c with the probability (1 + c² / (freedom scale²)) ^ (-freedom / 2).
+    """
+
+    scale: float
+    freedom: float
+
+    @property
+    def deviation(self) -> float:
+        """Standard deviation of a coordinate."""
+        return float(self.scale * np.sqrt(self.freedom / (self.freedom - 2)))
+
+    def beyond(self, length: float) -> float:
+        """Return the probability of a longer residual."""
+        unit = (length / self.scale) ** 2 / self.freedom
+        return float((1 + unit) ** (-self.freedom / 2))
+
+
+def tails(lengths: FloatArray) -> Tails:
+    """Return the most likely distribution of lengths (m,), of which longer ones are cut off [2]_.
+
+    It is about normal unless the lengths say clearly that their tails are heavier.
+    """
+    ordered = np.sort(lengths[np.isfinite(lengths)])
+    if not len(ordered) or ordered[-1] <= 0:
+        return Tails(1.0, _NORMAL)
+    step = max(1, len(ordered) // _ENOUGH)
+    squares, cut = ordered[step // 2 :: step] ** 2, ordered[-1]
+    best = -np.inf, Tails(1.0, _NORMAL)
+    for freedom in _FREEDOMS:
+        middle = np.median(ordered) / np.sqrt(freedom * (2 ** (2 / freedom) - 1))
+        for scale in middle * _SCALES:
+            unit = 2 * np.log(scale) + (freedom / 2 + 1) * np.log1p(squares / freedom / scale**2)
+            found = Tails(float(scale), freedom)
+            seen = np.log1p(-found.beyond(cut))
+            likelihood = -step * float(unit.sum() + len(unit) * seen)
+            likelihood += _CLEARLY if freedom == _NORMAL else 0.0
+            best = max(best, (likelihood, found))
+    return best[1]
+
+
 def normalised(
-    layout: Layout, state: Start, design: Design, known: Precision, used: NDArray[np.bool_]
+    layout: Layout, state: Start, design: Design, computed: FloatArray, used: NDArray[np.bool_]
 ) -> FloatArray:
     """Return residuals (m,) over their standard deviations, of observations used (m,) or not.
 
-    These are lengths of 2-vectors. One that no other checks, and whose residual is therefore zero,
-    has NaN.
+    `computed` (m, 2, 2) are the whitened covariances of computed image points. Results are
+    lengths of 2-vectors. One that no other checks, and whose residual is therefore zero, has NaN.
     """
-    computed = of_computed(layout, design, known)
     of_residual = np.eye(2) + np.where(used, -1, 1)[:, None, None] * computed
     sizes, axes = np.linalg.eigh(of_residual)
     along = (axes.transpose(0, 2, 1) @ design.misclosure[:, :, None])[:, :, 0]

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ahf_ros.interchange.network_results import rejections
+from ahf_ros.orientation.calibration import usual_deviations
 from ahf_ros.orientation.camera import PARAMETERS
 from ahf_ros.orientation.deviations import bar_deviations, control_deviations
 from ahf_ros.orientation.points import standard_deviations
@@ -29,6 +30,7 @@ def summary(solution: Solution) -> Rows:
         ('photographs', _of(posed)),
         ('targets', _of(known)),
         ('image points used', _of(used)),
+        ('image points left out', _left_out(solution)),
         ('sigma0', f'{solution.sigma0:.3f}{scaled}'),
         ('redundancy', str(solution.redundancy)),
     ]
@@ -55,18 +57,29 @@ def _of(chosen: np.ndarray) -> str:
     return f'{number}' if number == len(chosen) else f'{number} of {len(chosen)}'
 
 
+def _left_out(solution: Solution) -> str:
+    tested = sum(it.normalised_residual is not None for it in solution.rejected)
+    return f'{tested}, expected by chance {solution.expected_rejections:.1f}'
+
+
 def camera_rows(solution: Solution, camera: int) -> Rows:
-    """Return parameters, their values and standard deviations, of a calibrated camera."""
+    """Return parameters of a calibrated camera, values, standard deviations, and their ratio.
+
+    Instead of the ratio it says where photographs hardly know more than what is usual.
+    """
     rows = []
     sigmas = standard_deviations(solution.camera_covariances[camera])
     values = solution.start.calibrations[camera]
-    for name, value, sigma in zip(PARAMETERS, values, sigmas, strict=True):
+    before = usual_deviations(solution.network.cameras[camera], values[0]).values()
+    for name, value, sigma, usual in zip(PARAMETERS, values, sigmas, before, strict=True):
         called = f'{name}, px' if name in _IN_PX else name
         if name in solution.released[camera]:
             digits = decimals([sigma])
-            rows.append((called, f'{value:.{digits}f}', f'{sigma:.{digits}f}'))
+            ratio = '' if name in _IN_PX else f'{abs(value) / sigma:.1f}'
+            ratio = 'as usual of lenses' if sigma > usual / 2 else ratio
+            rows.append((called, f'{value:.{digits}f}', f'{sigma:.{digits}f}', ratio))
         elif value:
-            rows.append((called, f'{value:.7g}', 'kept'))
+            rows.append((called, f'{value:.7g}', 'kept', ''))
     return rows
 
 
@@ -77,7 +90,7 @@ def bar_rows(solution: Solution) -> Rows:
     return [
         (
             ' to '.join(it.bar.ends),
-            _role(it.bar.check),
+            _role(solution, it.bar.check, it.bar.title),
             f'{it.bar.length:.{digits}f}',
             f'{it.deviation:+.{digits}f}',
             f'{it.sigma:.{digits}f}',
@@ -94,7 +107,7 @@ def control_rows(solution: Solution) -> Rows:
     return [
         (
             it.point.name,
-            _role(it.point.check),
+            _role(solution, it.point.check, it.point.title),
             *(f'{value:+.{digits}f}' for value in it.deviation),
             ', '.join(f'{value:.{digits}f}' for value in it.sigma),
         )
@@ -102,8 +115,9 @@ def control_rows(solution: Solution) -> Rows:
     ]
 
 
-def _role(check: bool) -> str:
-    return 'check' if check else 'control'
+def _role(solution: Solution, check: bool, name: str) -> str:
+    verdicts = {it.name: it.verdict for it in solution.suspects}
+    return verdicts.get(name, 'check' if check else 'control')
 
 
 def rejected_rows(solution: Solution) -> Rows:

@@ -101,6 +101,28 @@ def test_control_points_give_their_frame(results: Path, tmp_path: Path) -> None:
     assert (tmp_path / 'control.csv').exists()
 
 
+@pytest.mark.parametrize('keep', [False, True])
+def test_a_wrong_bar_has_a_status_of_its_own(
+    results: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], keep: bool
+) -> None:
+    points = TRUE.start.points
+    lengths = [float(np.linalg.norm(points[2 * it] - points[2 * it + 1])) for it in range(3)]
+    rows = [(2 * it + 1, 2 * it + 2, length, 0.01) for it, length in enumerate(lengths)]
+    rows[1] = (*rows[1][:2], lengths[1] + 5, 0.01)
+    with (tmp_path / 'bars.csv').open('w', newline='') as file:
+        csv.writer(file).writerows([('id_1', 'id_2', 'length', 'sigma'), *rows])
+    options = ['--scale-bars', tmp_path / 'bars.csv', *(['--keep-suspects'] if keep else [])]
+    camera = '--calibration', results.parent / 'camera.yaml'
+    assert status('orient', results, '-o', tmp_path / 'out', *camera, *options) == 3
+    told = ' '.join(capsys.readouterr().err.split())
+    assert 'scale bar 3-4 contradicts the rest by' in told
+    assert ('kept' if keep else 'left out') in told
+    found = read_network(tmp_path / 'out')
+    assert not found.rejected
+    error = distances(found.points.xyz) - distances(points)
+    assert (np.abs(error).max() < 0.2) == (not keep)
+
+
 def test_groups_are_written_each_by_itself(
     results: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -285,7 +285,8 @@ def test_bad_calibrations_are_refused(tmp_path: Path, text: str, message: str) -
     [
         ('distortion_model: equidistant', "distortion_model is 'equidistant'"),
         ('D: [1, 2, 3]', r'accepted are 4 or 5 numbers'),
-        ('D: [1, 2, 3, 4, 5, 6, 7, 8]', r'accepted are 4 or 5 numbers'),
+        ('D: [1, 2, 3, 4, 5, 6, 7, 8]', r'of the rational model; accepted are 4 or 5 numbers'),
+        ('D: [1, 2, 3, 4, 5, 0, 0, 0, 1, 0, 0, 0]', r'of a thin prism; accepted are 4'),
     ],
 )
 def test_other_lenses_are_refused(tmp_path: Path, more: str, message: str) -> None:
@@ -293,6 +294,35 @@ def test_other_lenses_are_refused(tmp_path: Path, more: str, message: str) -> No
     matrix = '[9, 0, 4, 0, 9, 3, 0, 0, 1]'
     path.write_text(f'image_width: 8\nimage_height: 6\nK: {matrix}\n{more}\n')
     with pytest.raises(ValueError, match=message):
+        read_camera(path)
+
+
+KALIBR = """cam0:
+  camera_model: {camera}
+  intrinsics: [3000.0, 3010.0, 2010.5, 1492.5]
+  distortion_model: {model}
+  distortion_coeffs: [-0.08, 0.06, 0.0003, -0.0002]
+  resolution: [4000, 3000]
+  rostopic: /cam0/image_raw
+"""
+
+
+def test_a_calibration_of_kalibr_is_read(tmp_path: Path) -> None:
+    path = tmp_path / 'camchain.yaml'
+    path.write_text(KALIBR.format(camera='pinhole', model='radtan'))
+    file = read_camera(path)
+    assert (file.width, file.height) == (4000, 3000)
+    expected = [3010, 2010.5, 1492.5, -0.08, 0.06, 0, 0.0003, -0.0002, 3000 / 3010 - 1, 0]
+    np.testing.assert_allclose(file.calibration, expected, atol=1e-15)
+    for camera, model, message in (
+        ('pinhole', 'equidistant', "distortion_model is 'equidistant'"),
+        ('omni', 'radtan', "camera_model is 'omni'"),
+    ):
+        path.write_text(KALIBR.format(camera=camera, model=model))
+        with pytest.raises(ValueError, match=message):
+            read_camera(path)
+    path.write_text(KALIBR.format(camera='pinhole', model='radtan') + 'cam1: {}')
+    with pytest.raises(ValueError, match='cam0, cam1, accepted is one camera a file'):
         read_camera(path)
 
 

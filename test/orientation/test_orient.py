@@ -104,6 +104,42 @@ def test_half_of_the_photographs_of_the_panel():
     assert first / second == pytest.approx(608.8297 / 747.6563, rel=2e-4)
 
 
+def test_the_frame_is_that_of_the_principal_axes():
+    solution = oriented_by_five()
+    points = solution.measured_points.xyz
+    np.testing.assert_allclose(points.mean(axis=0), 0, atol=1e-3)
+    spread = points.T @ points
+    np.testing.assert_allclose(spread, np.diag(np.diag(spread)), atol=1e-3 * spread.max())
+    assert (np.diff(np.diag(spread)) < 0).all()
+    assert (solution.start.positions[:, 2] > 0).all()
+
+
+def test_a_fisheye_lens_is_named():
+    seen = taken(count=8, focal=1000.0, number=60)
+    network = seen.network
+    source = np.random.default_rng(9)
+    rotations, positions = (np.array(it) for it in ring(8, 35))
+    positions = 0.45 * positions  # so near that targets are up to 60 degrees off the axis
+    photograph, point = (it.ravel() for it in np.indices((8, 60)))
+    towards = np.einsum(
+        'mij,mj->mi', rotations[photograph], seen.points[point] - positions[photograph]
+    )
+    flat = np.hypot(*towards.T[:2])
+    angle = np.arctan2(flat, towards[:, 2])
+    xy = 900 * (angle / flat)[:, None] * towards[:, :2] + [1499.5, 999.5]
+    inside = ((xy > 0) & (xy < [3000, 2000])).all(axis=1)
+    observations = replace(
+        network.observations,
+        photograph=photograph[inside],
+        point=point[inside],
+        xy=xy[inside] + source.normal(0, 0.05, (inside.sum(), 2)),
+        covariance=np.tile(0.05**2 * np.eye(2), (inside.sum(), 1, 1)),
+    )
+    cameras = (CameraView('camera', 3000, 2000, 900.0),)
+    (solution, *_) = orient(replace(network, cameras=cameras, observations=observations))
+    assert any('an equidistant fisheye lens' in text for text in solution.warnings)
+
+
 def test_two_photographs_are_never_a_network():
     """What is left of three photographs of which one contradicts the others is no network."""
     network = taken(count=3, focal=FOCAL).network

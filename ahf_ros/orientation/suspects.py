@@ -1,0 +1,335 @@
+"""Scale bars and control points are tested against the photographs before these believe them.
+
+The photographs alone give points up to a similarity, with their covariance. With misclosures l of
+what is known, their covariance C from both, and A as their change under a similarity,
+
+    P = C^-1 - C^-1 A (A' C^-1 A)^- A' C^-1,    v = P l,    T_i = v_i' P_ii^+ v_i
+
+tests the rows i of one bar or point against all others, and P_ii^+ v_i is what it differs from
+them [1]_. The worst goes first. Where leaving out another one explains nearly as much, as always
+of two, nobody can tell which is wrong: then both get the variance at which they agree, as do all
+where no few are to blame [2]_, and deviations are tested against that of the rest [3]_.
+
+References
+----------
+.. [1] Baarda, A testing procedure for use in geodetic networks, 1968; Förstner & Wrobel,
+   Photogrammetric Computer Vision, Springer 2016, 4.6.4.
+.. [2] Paule & Mandel, Consensus values and weighting factors, J. Res. NBS 87 (1982), 377-385.
+.. [3] Rosner, Percentage points for a generalized ESD many-outlier procedure, Technometrics 25
+   (1983), 165-172.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from ahf_ros.orientation.datum import movements
+from ahf_ros.orientation.deviations import with_unit
+from ahf_ros.orientation.knowledge import Known, of_bars, of_control
+from ahf_ros.orientation.network import FloatArray, IntArray, Network
+from ahf_ros.orientation.solution import Suspect
+from ahf_ros.orientation.testing import BY_CHANCE, special
+
+_DECISIVE = 2 * np.log(20)  # chi-square by which one is to blame rather than another: odds of 20
+_CHECKED = 1e-6  # share of a variance that others must leave for something to be tested
+_RANK = 1e-9  # of eigenvalues, relative to the largest
+_HALVINGS = 40
+_TINY = float(np.finfo(float).tiny)
+_LEAST = 1e-12  # probability that is said
+_NONE = np.array([], int)
+
+
+class Examined(NamedTuple):
+    """The network as far as it is believed, suspects, and warnings."""
+
+    network: Network
+    suspects: tuple[Suspect, ...]
+    warnings: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class _Tested:
+    """Statistics of groups (g,), their degrees of freedom and gaps, and those of all together.
+
+    With a `common` variance, that of the others is estimated from them.
+    """
+
+    statistics: FloatArray
+    freedom: IntArray
+    gaps: FloatArray
+    whole: float
+    redundancy: int
+    common: bool
+
+    @property
+    def external(self) -> FloatArray:
+        """Statistics by the variance that all but the tested one have."""
+        if not self.common:
+            return self.statistics
+        rest = np.maximum(self.redundancy - self.freedom, 1)
+        return self.statistics * rest / np.maximum(self.whole - self.statistics, _TINY)
+
+    @property
+    def chances(self) -> FloatArray:
+        """How often chance makes one of all statistics so large (Bonferroni)."""
+        able = self.freedom > 0
+        freedom = np.maximum(self.freedom, 1)
+        if self.common:
+            rest = self.redundancy - self.freedom
+            able &= rest > 0
+            chances = special().fdtrc(freedom, np.maximum(rest, 1), self.external / freedom)
+        else:
+            chances = special().chdtrc(freedom, self.statistics)
+        return np.where(able, np.minimum(able.sum() * chances, 1.0), 1.0)
+
+    @property
+    def gains(self) -> FloatArray:
+        """Twice the log likelihood that leaving out each gains, less its degrees of freedom."""
+        gains = self.statistics
+        if self.common:
+            left = np.maximum(self.whole - self.statistics, _TINY)
+            gains = self.redundancy * np.log(max(self.whole, _TINY) / left)
+        return np.where(self.freedom > 0, gains - self.freedom, -np.inf)
+
+
+@dataclass(frozen=True)
+class _Misclosures:
+    """Known minus measured: `gaps` (r,), their change under similarities, and both covariances."""
+
+    names: tuple[str, ...]
+    group: IntArray
+    gaps: FloatArray
+    free: FloatArray
+    given: FloatArray
+    measured: FloatArray
+
+    @classmethod
+    def of(cls, known: Known, points: FloatArray, covariance: FloatArray) -> _Misclosures:
+        """Return what bars and control points have over measured points."""
+        parts = of_bars(known, points), of_control(known, points)
+        rows, gaps, given = (np.concatenate(column) for column in zip(*parts, strict=True))
+        names = [it.title for it in known.bars] + [it.title for it in known.control]
+        group = np.r_[np.arange(len(known.bars)), np.repeat(np.arange(len(known.control)), 3)]
+        group[len(known.bars) :] += len(known.bars)
+        free = rows @ movements(points)
+        return cls(tuple(names), group, gaps, free, given, rows @ covariance @ rows.T)
+
+    def weighed(self, kept: IntArray, added: FloatArray) -> tuple[IntArray, FloatArray, int]:
+        """Return the groups of rows that are kept, P, and its rank.
+
+        Variances are larger by `added` (groups,).
+        """
+        rows = np.isin(self.group, kept)
+        free, group = self.free[rows], self.group[rows]
+        covariance = self.measured[np.ix_(rows, rows)] + np.diag(self.given[rows] + added[group])
+        # What similarities change may have any variance: no test sees it (Rao 1973, 4i.4).
+        size = np.trace(covariance) / max(float((free**2).sum()), _TINY)
+        weight = np.linalg.inv(covariance + size * free @ free.T)
+        normal = free.T @ weight @ free
+        sizes, axes = np.linalg.eigh(normal)
+        able = sizes > _RANK * sizes[-1]
+        half = weight @ free @ (axes[:, able] / np.sqrt(sizes[able]))
+        return group, weight - half @ half.T, int(rows.sum() - able.sum())
+
+    def tested(self, kept: IntArray, common: IntArray = _NONE, sigma: float = 0.0) -> _Tested:
+        """Return the tests of kept groups, those in `common` with a further sigma."""
+        added = np.zeros(len(self.names))
+        added[common] = sigma**2
+        group, residual, redundancy = self.weighed(kept, added)
+        gaps = self.gaps[np.isin(self.group, kept)]
+        pulls = residual @ gaps
+        statistics, freedom = np.zeros(len(kept)), np.zeros(len(kept), int)
+        differences = np.zeros(len(kept))
+        for place, number in enumerate(kept):
+            own = group == number
+            sizes, axes = np.linalg.eigh(residual[np.ix_(own, own)])
+            checked = sizes > _CHECKED * np.abs(residual).max()
+            along = (axes.T @ pulls[own])[checked]
+            statistics[place] = float((along**2 / sizes[checked]).sum())
+            differences[place] = float(np.linalg.norm(along / sizes[checked]))
+            freedom[place] = int(checked.sum())
+        whole = float(gaps @ pulls)
+        return _Tested(statistics, freedom, differences, whole, redundancy, len(common) > 0)
+
+    def agreeing(self, kept: IntArray, blamed: IntArray) -> float:
+        """Return the standard deviation, beside the given one, at which kept groups agree.
+
+        That of blamed groups grows until the statistic of all is their redundancy.
+        """
+        gaps = self.gaps[np.isin(self.group, kept)]
+        added = np.zeros(len(self.names))
+        low, high = 0.0, 2 * float(np.abs(self.gaps).max())
+        for _ in range(_HALVINGS):
+            middle = (low + high) / 2
+            added[blamed] = middle**2
+            _, residual, redundancy = self.weighed(kept, added)
+            low, high = (middle, high) if gaps @ residual @ gaps > redundancy else (low, middle)
+        return high
+
+
+@dataclass
+class _Findings:
+    """What is left out, what cannot be told apart, and the standard deviation that is added."""
+
+    kept: IntArray
+    suspects: list[Suspect]
+    blamed: IntArray
+    added: float
+
+
+def examined(
+    network: Network, known: Known, points: FloatArray, covariance: FloatArray, keep: bool
+) -> Examined:
+    """Return the network without bars and control points that contradict the photographs.
+
+    `known` has those that are used and checks; points (n, 3) of the layout and their covariance
+    are of the photographs alone, in about the frame and scale of what is known. Checks are
+    witnesses where those that are used contradict each other. Suspects are kept where `keep` says
+    so.
+    """
+    closures = _Misclosures.of(known, points, covariance)
+    told = np.array([it.check for it in known.bars] + [it.check for it in known.control], bool)
+    used = np.flatnonzero(~told)
+    if not len(used):
+        return Examined(network, (), ())
+    if not closures.tested(used).redundancy:
+        names = [closures.names[it] for it in used]
+        return Examined(network, (), () if told.any() else _unchecked(names))
+    found = _found(closures, used)
+    if any(it.rivals for it in found.suspects) and told.any():
+        heard = _found(closures, np.arange(len(told)))
+        ours = {closures.names[it] for it in used}
+        if all(it.name in ours and not it.rivals for it in heard.suspects):
+            found = heard
+    warnings = _words(network, closures, found, keep)
+    if keep:
+        kept = tuple(
+            replace(it, verdict='kept') if it.verdict == 'left out' else it
+            for it in found.suspects
+        )
+        return Examined(network, kept, warnings)
+    return Examined(_believed(network, closures, found), tuple(found.suspects), warnings)
+
+
+def _found(closures: _Misclosures, among: IntArray) -> _Findings:
+    """Return who is to blame among groups: few, those whose precision nobody gave, or all.
+
+    All are where even a larger variance makes too many of them suspects, or none.
+    """
+    given = np.bincount(closures.group, closures.given)
+    silent = among[given[among] == 0]
+    found = _search(closures, among, _NONE)
+    if found and not (found.suspects and len(silent)):
+        return found
+    if len(silent) and (found := _search(closures, among, silent)):
+        return found
+    found = _search(closures, among, among)
+    return found if found and found.suspects else _all_to_blame(closures, among)
+
+
+def _all_to_blame(closures: _Misclosures, among: IntArray) -> _Findings:
+    """Return that groups contradict each other, and none more than others."""
+    test = closures.tested(among)
+    worst = int(np.argmax(test.gains))
+    suspect = Suspect(
+        closures.names[among[worst]],
+        float(test.gaps[worst]),
+        float(test.gaps[worst] / np.sqrt(test.external[worst])),
+        float(test.chances[worst]),
+        'unclear',
+        tuple(closures.names[it] for it in np.delete(among, worst)),
+    )
+    return _Findings(among, [suspect], among, closures.agreeing(among, among))
+
+
+def _search(closures: _Misclosures, among: IntArray, common: IntArray) -> _Findings | None:
+    """Return the suspects, the worst first, None where half of what is known would be.
+
+    Groups in `common` have a variance beside the given one, at which all agree.
+    """
+    kept, suspects = among, list[Suspect]()
+    while 2 * len(suspects) < len(among):
+        sigma = closures.agreeing(kept, common) if len(common) else 0.0
+        test = closures.tested(kept, common, sigma)
+        chances, gains = test.chances, test.gains
+        worst = int(np.argmax(gains))
+        if chances[worst] >= BY_CHANCE:
+            return _Findings(kept, suspects, np.intersect1d(common, kept), sigma)
+        near = np.flatnonzero(gains > gains[worst] - _DECISIVE)
+        rivals = [int(it) for it in near if it != worst]
+        suspects.append(
+            Suspect(
+                closures.names[kept[worst]],
+                float(test.gaps[worst]),
+                float(test.gaps[worst] / np.sqrt(test.external[worst])),
+                float(chances[worst]),
+                'unclear' if rivals else 'left out',
+                tuple(closures.names[kept[it]] for it in rivals),
+            )
+        )
+        if rivals:
+            blamed = np.union1d(np.intersect1d(common, kept), kept[[worst, *rivals]])
+            return _Findings(kept, suspects, blamed, closures.agreeing(kept, blamed))
+        kept = np.delete(kept, worst)
+    return None
+
+
+def _believed(network: Network, closures: _Misclosures, found: _Findings) -> Network:
+    """Return the network whose suspects are checks, and whose blamed ones have their variance."""
+    left_out = {it.name for it in found.suspects if it.verdict == 'left out'}
+    blamed = {closures.names[it] for it in found.blamed}
+    bars, control = list(network.bars), list(network.control)
+    for place, bar in enumerate(bars):
+        if bar.title in left_out:
+            bars[place] = replace(bar, check=True)
+        elif bar.title in blamed and not bar.check:
+            bars[place] = replace(bar, sigma=float(np.hypot(bar.sigma, found.added)))
+    for place, point in enumerate(control):
+        if point.title in left_out:
+            control[place] = replace(point, check=True)
+        elif point.title in blamed and not point.check:
+            covariance = point.covariance + found.added**2 * np.eye(3)
+            control[place] = replace(point, covariance=covariance)
+    return replace(network, bars=tuple(bars), control=tuple(control))
+
+
+def _words(
+    network: Network, closures: _Misclosures, found: _Findings, keep: bool
+) -> tuple[str, ...]:
+    """Return what was found in words."""
+    unit = network.unit
+    warnings = [
+        f'{" or ".join((it.name, *it.rivals))} is wrong: they contradict each other by '
+        f'{with_unit(it.gap, unit)}, {it.gap / it.sigma:.1f} standard deviations, and nothing '
+        'says which. Measure them again'
+        if it.rivals
+        else f'{it.name} contradicts the rest by {with_unit(it.gap, unit)}, '
+        f'{it.gap / it.sigma:.1f} standard deviations (probability '
+        f'{max(it.probability, _LEAST):.1g}): '
+        + ('it is used all the same' if keep else 'it is left out')
+        for it in found.suspects
+    ]
+    if len(found.blamed):
+        names = [closures.names[it] for it in found.blamed]
+        given = closures.given[np.isin(closures.group, found.blamed)]
+        told = float(np.sqrt(given.mean()))
+        fits = with_unit(float(np.hypot(told, found.added)), unit)
+        used = 'is used instead' if not keep else 'would fit'
+        what = ', '.join(names) if len(names) < 4 else f'{names[0]} and {len(names) - 1} others'
+        warnings.append(
+            f'{what}: a standard deviation of {with_unit(told, unit)} contradicts the '
+            f'photographs; one of {fits} {used}'
+        )
+    return tuple(warnings)
+
+
+def _unchecked(names: Sequence[str]) -> tuple[str, ...]:
+    """Return that nothing checks what is known."""
+    them, are = ('it', 'is') if len(names) == 1 else ('them', 'are')
+    return (
+        f'{", ".join(names)} {are} believed: nothing checks {them}. Give another one, or a check',
+    )

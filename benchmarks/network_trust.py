@@ -1,0 +1,274 @@
+"""Whether covariances, rejections and suspects are right: lenses, heavy tails, bars and control.
+
+    python -m benchmarks.network --table lenses [--seed 301] [--runs 250]
+    python -m benchmarks.network --table still
+    python -m benchmarks.network --table tails
+    python -m benchmarks.network --table told
+
+*NEES* is the mean of e' C^+ e over its degrees of freedom, for the errors e of all points after a
+similarity and their whole covariance C: 1 if standard deviations are right.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ahf_ros.orientation.adjustment import adjust
+from ahf_ros.orientation.camera import PARAMETERS, project
+from ahf_ros.orientation.congruence import compare
+from ahf_ros.orientation.measurement import distances
+from ahf_ros.orientation.network import ControlPoint, Network, ScaleBar
+from ahf_ros.orientation.points import MeasuredPoints, entries
+from ahf_ros.orientation.similarity import similarity_between
+from ahf_ros.orientation.solution import Solution, Start
+from benchmarks.network_ellipsoids import coverage
+from benchmarks.network_scenes import HEIGHT, LENS, WIDTH, Field, approximate, simulate
+from benchmarks.report import number, progress
+from benchmarks.report import table as markdown
+
+SIZE = Field(36, 108)
+FREEDOM = 5.0
+GROSS, LARGE = 0.01, 6.0
+TOLD = (
+    *(('bars', count, 1e-4) for count in (3, 4, 5)),
+    *(('control points', count, 1e-4) for count in (4, 5, 6, 8)),
+    *(('control points', count, 0.0) for count in (6, 8)),
+)
+"""What is told, how many of them, and their standard deviation, in units of a field of 2."""
+_RANK = 1e-10  # of eigenvalues of a covariance without a datum, relative to the largest
+
+
+def nees(solution: Solution, truth: Start) -> float:
+    """Return the normalised squared error of all points over its degrees of freedom."""
+    some = np.flatnonzero(solution.determined)
+    points, rows = solution.start.points[some], entries(some)
+    moved = similarity_between(truth.points[some], points).moved(truth.points[some])
+    values, vectors = np.linalg.eigh(solution.covariance_of_points[np.ix_(rows, rows)])
+    real = values > _RANK * values[-1]
+    along = (vectors.T @ (points - moved).ravel())[real]
+    return float(np.mean(along**2 / values[real]))
+
+
+def lenses_table(seeds: Sequence[int], runs: int) -> list[str]:
+    """Return whether standard deviations hold where lenses have all parameters."""
+    rows = []
+    for cameras, rolled in ((1, True), (1, False), (2, True), (2, False)):
+        field = replace(SIZE, rolled=rolled)
+        found = []
+        for run in progress(range(runs), f'{cameras} cameras, rolled: {rolled}'):
+            random = np.random.default_rng([seeds[0], cameras, rolled, run])
+            network, truth = simulate(field, random, _lenses(cameras, random))
+            solution = adjust(network, approximate(truth, random, 0.005))
+            sigma = np.sqrt([np.diag(it) for it in solution.camera_covariances])
+            errors = np.abs(solution.start.calibrations - truth.calibrations) / sigma
+            lost = len(network.observations.xy) - int(solution.start.used.sum())
+            found.append(
+                (nees(solution, truth), 100 * coverage(solution, truth), (errors > 3).mean(), lost)
+            )
+        means = np.mean(found, axis=0)
+        spread = np.std([it[0] for it in found]) / np.sqrt(runs)
+        rows.append(
+            (
+                cameras,
+                'some' if rolled else 'none',
+                runs,
+                f'{means[0]:.3f} +- {spread:.3f}',
+                number(means[1], 1),
+                number(100 * means[2], 2),
+                int(np.sum([it[3] for it in found])),
+            )
+        )
+    head = (
+        *('cameras', 'rolls', 'runs', 'NEES', 'in 95 % ellipsoids %'),
+        *('parameters off by 3 sigma %', 'good rays lost'),
+    )
+    return markdown(head, rows)
+
+
+def _lenses(cameras: int, random: np.random.Generator) -> np.ndarray:
+    """Return calibrations whose every parameter differs by 5 to 100 sigma from nothing."""
+    sigma = np.array([0.08, 0.1, 0.1, 1.7e-4, 1.1e-3, 2.2e-3, 8e-6, 8e-6, 2e-6, 2e-6])
+    signs = random.choice([-1, 1], (cameras, len(PARAMETERS)))
+    sizes = 5 * 20 ** random.random((cameras, len(PARAMETERS)))
+    middle = np.array([LENS[0], (WIDTH - 1) / 2, (HEIGHT - 1) / 2, *np.zeros(7)])
+    lenses: np.ndarray = middle + signs * sizes * sigma
+    return lenses
+
+
+def still_table(seeds: Sequence[int], runs: int) -> list[str]:
+    """Return how often two epochs without movement seem to have one; all but targets is new."""
+    alarms = np.zeros(2, int)
+    for run in progress(range(runs), 'pairs of epochs'):
+        random = np.random.default_rng([seeds[0], run])
+        targets = random.uniform(-1, 1, (40, 3)) * [1, 1, 0.5]
+        epochs = []
+        for _ in range(2):
+            lens = _lenses(1, random)
+            network, truth = simulate(Field(16, 40), random, lens, targets)
+            epochs.append(adjust(network, approximate(truth, random, 0.005)).measured_points)
+        found = compare(*epochs)
+        alarms += [not found.congruent, bool(found.moved)]
+    shares = [number(100 * it / runs, 1) for it in alarms]
+    return markdown(('pairs', 'false alarms %', 'with a target named %'), [(runs, *shares)])
+
+
+def tails_table(seeds: Sequence[int], runs: int) -> list[str]:
+    """Return what is kept and found where errors have heavy tails and some are gross."""
+    rows = []
+    for name, freedom in (('normal', np.inf), ('t of 5', FREEDOM)):
+        found = []
+        for run in progress(range(runs), name):
+            random = np.random.default_rng([seeds[0], int(min(freedom, 99)), run])
+            network, truth = simulate(Field(24, 60), random)
+            network, gross, large = _disturbed(network, truth, freedom, random)
+            start = approximate(truth, random, 0.005)
+            solution = adjust(network, start)
+            knowing = adjust(network, replace(start, used=~gross), test=False)
+            used = solution.start.used
+            found.append(
+                (
+                    (used & ~gross).sum(),
+                    (~gross).sum(),
+                    (~used & large).sum(),
+                    large.sum(),
+                    _rms(solution, truth),
+                    _rms(knowing, truth),
+                    nees(solution, truth),
+                    solution.expected_rejections,
+                )
+            )
+        kept, good, caught, wrong, rms, best, squares, expected = np.array(found).T
+        rows.append(
+            (
+                name,
+                runs,
+                number(100 * kept.sum() / good.sum(), 2),
+                number(100 * caught.sum() / wrong.sum(), 2),
+                number(np.sqrt((rms**2).mean() / (best**2).mean()), 3),
+                number(1 / np.sqrt(squares.mean()), 3),
+                int((good - kept).sum()),
+                number(expected.sum(), 1),
+            )
+        )
+    head = (
+        *('errors', 'runs', 'good rays kept %', 'gross above 6 sigma found %'),
+        *('RMS to that of knowing', 'stated to real sigma', 'good lost', 'expected lost'),
+    )
+    return markdown(head, rows)
+
+
+def _disturbed(
+    network: Network, truth: Start, freedom: float, random: np.random.Generator
+) -> tuple[Network, np.ndarray, np.ndarray]:
+    """Return a network with t-distributed errors and gross ones, which, and which are large."""
+    seen = network.observations
+    sigma = np.sqrt(seen.covariance[:, 0, 0])
+    count = len(sigma)
+    chi = random.chisquare(FREEDOM, count) / FREEDOM if np.isfinite(freedom) else np.ones(count)
+    exact = _exact(network, truth)
+    error = (seen.xy - exact) / np.sqrt(chi)[:, None]
+    deviation = sigma * (np.sqrt(freedom / (freedom - 2)) if np.isfinite(freedom) else 1.0)
+    gross = random.random(count) < GROSS
+    towards = random.standard_normal((count, 2))
+    towards /= np.linalg.norm(towards, axis=1)[:, None]
+    size = deviation * 3 * 100 ** random.random(count)
+    error += np.where(gross, size, 0)[:, None] * towards
+    large = gross & (np.linalg.norm(error, axis=1) > LARGE * deviation)
+    return replace(network, observations=replace(seen, xy=exact + error)), gross, large
+
+
+def _exact(network: Network, truth: Start) -> np.ndarray:
+    """Return the image points (m, 2) without errors."""
+    seen = network.observations
+    exact: np.ndarray = project(
+        truth.calibrations[network.camera_of[seen.photograph]],
+        truth.rotations[seen.photograph],
+        truth.positions[seen.photograph],
+        truth.points[seen.point],
+    )
+    return exact
+
+
+def _rms(solution: Solution, truth: Start) -> float:
+    some = solution.determined
+    points = solution.start.points[some]
+    moved = similarity_between(truth.points[some], points).moved(truth.points[some])
+    return float(np.sqrt(((points - moved) ** 2).mean()))
+
+
+def told_table(seeds: Sequence[int], runs: int) -> list[str]:
+    """Return how often a wrong bar or control point is named, and nothing else."""
+    rows = []
+    for kind, count, sigma in TOLD:
+        named, unclear, good, rays, large = 0, 0, 0, 0, 0
+        for run in progress(range(runs), kind):
+            random = np.random.default_rng([seeds[0], len(kind), count, sigma > 0, run])
+            network, truth = simulate(Field(12, 40), random)
+            start = approximate(truth, random, 0.005)
+            alone = adjust(network, start).measured_points
+            told, wrong, size = _told(kind, count, sigma, truth, alone, random)
+            solution = adjust(replace(network, **told), start)
+            clear = [it.name for it in solution.suspects if not it.rivals]
+            either = {name for it in solution.suspects for name in (it.name, *it.rivals)}
+            large += size > LARGE
+            named += size > LARGE and wrong in clear
+            unclear += size > LARGE and wrong in either and wrong not in clear
+            good += sum(name != wrong for name in clear)
+            rays += len(network.observations.xy) - int(solution.start.used.sum())
+        rows.append(
+            (
+                *(f'{count} {kind}', f'{sigma:g}', runs, large),
+                number(100 * named / max(large, 1), 1),
+                number(100 * unclear / max(large, 1), 1),
+                *(good, rays),
+            )
+        )
+    head = (
+        *('told', 'sigma', 'runs', 'wrong by over 6 sigma', 'named %', 'among rivals %'),
+        *('good ones named', 'rays lost'),
+    )
+    return markdown(head, rows)
+
+
+def _told(
+    kind: str,
+    count: int,
+    sigma: float,
+    truth: Start,
+    alone: MeasuredPoints,
+    random: np.random.Generator,
+) -> tuple[dict[str, object], str, float]:
+    """Return what is told, which of it is wrong, and by how many standard deviations.
+
+    These are of what is told and of the photographs alone, together.
+    """
+    size = 4 * 100 ** random.random()
+    names = [str(it) for it in random.permutation(len(truth.points))]
+    if kind == 'bars':
+        pairs = list(zip(names[:count], names[count : 2 * count], strict=True))
+        lengths = [np.linalg.norm(truth.points[int(a)] - truth.points[int(b)]) for a, b in pairs]
+        together = np.hypot(sigma, distances(alone, pairs[:1])[0].sigma)
+        errors = random.normal(0, sigma, count)
+        errors[0] += size * together * random.choice([-1, 1])
+        bars = [
+            ScaleBar(pair, float(length + error), sigma)
+            for pair, length, error in zip(pairs, lengths, errors, strict=True)
+        ]
+        return {'bars': tuple(bars), 'unit': 'm'}, f'scale bar {"-".join(pairs[0])}', size
+    towards = random.standard_normal(3)
+    towards /= np.linalg.norm(towards)
+    together = np.sqrt(sigma**2 + towards @ alone.chosen(names[:1]).covariance @ towards)
+    control = tuple(
+        ControlPoint(
+            name,
+            truth.points[int(name)]
+            + random.normal(0, sigma, 3)
+            + (place == 0) * size * together * towards,
+            sigma**2 * np.eye(3),
+        )
+        for place, name in enumerate(names[:count])
+    )
+    return {'control': control, 'unit': 'm'}, f'control point {names[0]}', size
