@@ -56,7 +56,8 @@ _UNEVEN = 0.011  # usual error of slopes where light is no slope within a profil
 _OF_LIGHT, _EVEN = 78.0, 0.0085
 _LONG = 6.0  # radius of dots, px, from which profiles are long enough for slopes to tell of light
 _SYSTEMATIC = 0.001  # standard deviation of what pixels and interpolation do to a centre, px
-_PRIOR_SCALE = .03  # standard deviation of the printed proportions of circles and dot
+_PRIOR_SCALE = 0.003  # standard deviation of the printed proportions of circles and dot
+_PRIOR_LIT_SCALE = 0.02  # the same as uneven light shows them
 _PRIOR_PERSPECTIVE = 0.02  # of the projective part, in 1 a dot radius
 _PRIOR_SHIFT = 1.0  # of the shift of edges towards the dark side, px
 _WEAK_PRIOR = 1e-6  # of the other changes, so that they can always be solved for
@@ -70,7 +71,7 @@ class Fit(ArrayRecord):
     polarity: np.ndarray  # int, (k,), 1 for a dark target on bright ground, -1 for a bright one
     contrast: np.ndarray  # (k,), usual gray value of the dark side of edges over the bright side's
     bright: np.ndarray  # (k,), usual gray value of the bright side
-    share: np.ndarray  # (k,), of the expected edges, or those of the dot if fewer, that are in place
+    share: np.ndarray  # (k,), of expected edges, or of the dot's if fewer, that are in place
     deviation: np.ndarray  # (k,), standard deviation of these edges, px
     covariance: np.ndarray  # (k, 2, 2), of the image of the centre, px^2; NaN if not asked for
     blur: np.ndarray  # (k,), of the edges, standard deviation in px
@@ -165,13 +166,16 @@ def fit_circles(
     rounds: int = 2,
     blur: np.ndarray | None = None,
     covariances: bool = True,
+    uneven: bool = False,
 ) -> Fit:
     """Move frames, shape (k, 3, 3) and right to about two pixels, onto the edges of circles.
 
     Edges within `reach` of a circle, dot radii, a number or of shape (k, 1), are measured `rounds`
     times in `gray`, float32 from 0 to 255. In a projective fit the circles have different radii,
     so that they determine the common centre; otherwise it is the centre of the ellipse. `blur`,
-    shape (k,), is the standard deviation of the edges, px, as far as it is known.
+    shape (k,), is the standard deviation of the edges, px, as far as it is known. `uneven` light
+    moves edges as noise does, so that those in the light do not outweigh those in shadow by the
+    square of their contrast; the share is the dot's where less of the dot is in place.
     """
     blur = np.full(len(frames), USUAL_BLUR) if blur is None else blur
     window = _window(circles.angles.tobytes(), circles.radii.tobytes())
@@ -180,7 +184,7 @@ def fit_circles(
         frames = moved
         edges = measure_outlines(gray, edge_points(frames, circles), blur, reach)
         blur = np.clip(blur + median(edges.softness, edges.visible, 0.0), *BLURS)
-        solution = _solve(edges, circles, window, projective)
+        solution = _solve(edges, circles, window, projective, uneven)
         of_frame = solution.changes[:, :7]
         np.clip(of_frame, -_MAXIMUM_CHANGE, _MAXIMUM_CHANGE, out=of_frame)
         moved = frame.moved(frames, of_frame)
@@ -188,7 +192,7 @@ def fit_circles(
     placed = seen & (solution.relative < _PLACED) & (np.abs(errors) < _PLACED_RADII)
     count = placed.sum(axis=1)
     shares = [_share(placed, edges.visible)]
-    if projective:
+    if uneven:
         # A band about another dot has most of its edges in place, but not those of the dot.
         dot = circles.group == 0
         shares.append(_share(placed[:, dot], edges.visible[:, dot]))
@@ -230,7 +234,9 @@ class _Solution:
     robust: np.ndarray
 
 
-def _solve(edges: Edges, circles: Circles, window: np.ndarray, projective: bool) -> _Solution:
+def _solve(
+    edges: Edges, circles: Circles, window: np.ndarray, projective: bool, uneven: bool
+) -> _Solution:
     """Return the changes of the frames that bring the circles onto the edges."""
     own = weigh_edges(edges)
     common = common_slope(edges.slope, circles.polarity, own.weights)
@@ -243,13 +249,13 @@ def _solve(edges: Edges, circles: Circles, window: np.ndarray, projective: bool)
     of_noise = noise / np.maximum(edges.bright - edges.dark, _MINIMUM_STEP) / edges.scale
     usual_noise = median(of_noise, own.seen)[:, None]
     # Noise moves edges in shadow, light moves all of them.
-    deviation = np.hypot(of_noise, _UNEVEN_LIGHT / edges.scale) if projective else of_noise
+    deviation = np.hypot(of_noise, _UNEVEN_LIGHT / edges.scale) if uneven else of_noise
 
     def solve(weights: np.ndarray) -> tuple[tuple[np.ndarray, ...], np.ndarray]:
         nonlocal deviation
         changes, normal = model.solve(displacement, weights / deviation**2)
         errors = displacement - model.displacement(changes)
-        if projective:
+        if uneven:
             usual = spread(np.abs(errors), own.seen, 0.0)
             deviation = np.hypot(of_noise, np.sqrt(np.maximum(usual**2 - usual_noise**2, 0)))
         return (changes, normal, errors), np.abs(errors) / deviation
@@ -257,7 +263,7 @@ def _solve(edges: Edges, circles: Circles, window: np.ndarray, projective: bool)
     def scale(sizes: np.ndarray) -> np.ndarray:
         return _OUTLIER * spread(sizes, own.seen, _MINIMUM_SPREAD)
 
-    model = _DisplacementModel(circles, edges.scale, projective)
+    model = _DisplacementModel(circles, edges.scale, projective, uneven)
     (changes, normal, errors), relative, robust = reweight(solve, own.weights, scale, _ROUNDS)
     weights, robust = (of / deviation**2 for of in (own.weights, robust))
     return _Solution(own, light, model, changes, normal, weights, errors, relative, robust)
@@ -295,7 +301,9 @@ class _DisplacementModel:
     gamma of a camera causes, follow.
     """
 
-    def __init__(self, circles: Circles, scale: np.ndarray, projective: bool) -> None:
+    def __init__(
+        self, circles: Circles, scale: np.ndarray, projective: bool, uneven: bool
+    ) -> None:
         shared = frame.displacement_basis(circles.angles, circles.radii)
         own = np.zeros((len(scale), len(shared), 0))
         prior: np.ndarray = np.full(5, _WEAK_PRIOR)
@@ -304,7 +312,8 @@ class _DisplacementModel:
             scales = np.where(circles.group[:, None] == groups, circles.radii[:, None], 0)
             shared = np.concatenate([shared, scales], axis=1)
             own = (-circles.polarity / scale)[..., None]
-            deviations = [_PRIOR_PERSPECTIVE] * 2 + [_PRIOR_SCALE] * len(groups) + [_PRIOR_SHIFT]
+            of_scale = _PRIOR_LIT_SCALE if uneven else _PRIOR_SCALE
+            deviations = [_PRIOR_PERSPECTIVE] * 2 + [of_scale] * len(groups) + [_PRIOR_SHIFT]
             prior = np.concatenate([prior, np.array(deviations) ** -2])
         else:
             shared = shared[:, :5]

@@ -164,7 +164,6 @@ def test_edges_of_the_band_alone_do_not_make_a_share():
         group=np.repeat([0, 1, 1], count),
     )
     place = dot_frame(50.0, 50.0, 14.0)
-    fit = fit_circles(
-        drawn(place, radii=radii).astype(np.float32), place, circles, reach=0.15, projective=True
-    )
+    image = drawn(place, radii=radii).astype(np.float32)
+    fit = fit_circles(image, place, circles, reach=0.15, projective=True, uneven=True)
     assert fit.share[0] < 0.1

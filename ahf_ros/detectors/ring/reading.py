@@ -253,4 +253,5 @@ def _joint_fit(
         rounds=rounds,
         blur=start.blur,
         covariances=rounds > 1,
+        uneven=True,
     )
