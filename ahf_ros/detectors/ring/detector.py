@@ -224,8 +224,8 @@ def read_pyramid(
     for octave, _ in measured if shown else ():
         alike = seen.targets.alike(octave)
         if len(alike.frames):
-            alike = measure_alike(octave.pyramid.gray, alike)
-            later = _read(octave, images, alike, shown, seen, expected, every=False)
+            likely = measure_alike(octave.pyramid.gray, alike)
+            later = _read(octave, images, likely, shown, seen, expected, every=False)
             seen = seen.with_targets(later)  # all else was read in the shape of the dots
     for octave, dots in measured:
         part = octave.pyramid.gray
