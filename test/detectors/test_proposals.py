@@ -90,15 +90,15 @@ def test_rims_of_bands_about_narrow_gaps_propose_their_middles() -> None:
     assert dots.frames[3, :2, 2].tolist() == [11, 11]
 
 
-def test_a_dot_in_the_shape_of_others_is_where_its_edges_or_its_own_shape_put_it() -> None:
+def test_a_dot_in_the_shape_of_others_is_where_its_edges_put_it() -> None:
     rendering = render(replace(SMALL, texture=0.0, tilt=0.0, seed=5))
     gray = rendering.image.astype(np.float32)
     x, y = np.array([(it.x, it.y) for it in rendering.targets]).T
     right = measured(gray, x, y, SMALL.dot_radius, rounds=1)
     aside = replace(right, frames=frame.translated(right.frames, 3.0, 0.0))
     for dots in (right, aside):
-        alike = measure_alike(gray, dots, FAMILIES)
+        alike = measure_alike(gray, dots)
         assert (hopes(gray, alike, FAMILIES) > HOPEFUL).all()
         centres = sorted(alike.frames[:, :2, 2].tolist())
         assert np.allclose(centres, sorted(zip(x, y, strict=True)), atol=0.2)
-    assert not len(measure_alike(gray, right.select(slice(0)), FAMILIES).frames)
+    assert not len(measure_alike(gray, right.select(slice(0))).frames)

@@ -258,7 +258,7 @@ class PublishedGsiDetector(FamilyDetector):
             if settings.report_undecoded:
                 rest = np.delete(dots, decoded.members, axis=0)
                 single += [Target(id=UNDECODED, code=0, **_place(dot)) for dot in rest]
-        return sorted_targets([*best_targets(found), *single])
+        return sorted_targets([*best_targets(found, 1.0), *single])
 
 
 def find_dots(gray: np.ndarray, polarity: int, min_radius: float, max_radius: float) -> np.ndarray:
