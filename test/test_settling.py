@@ -129,7 +129,7 @@ def test_a_clear_image_settles_its_family_at_once_and_later_ones_cost_less(
     by_name = calls_of(lambda: named.identify(image))
     assert first < (2.2 if light == 'normal' else 3.6) * by_name
     assert later < 2.6 * by_name
-    # What all families' look has read stays as it is: in parts of other dots, with other last bits.
+    # What the look at all families read is kept: it was read beside other dots, to the last bits.
     by_look, alone = found[0].targets, named.identify(image).targets
     assert [it.print for it in by_look] == [it.print for it in alone]
     for one, other in zip(by_look, alone, strict=True):
