@@ -16,7 +16,7 @@ from ahf_ros.features.dots import NO_DOTS, Dots
 from ahf_ros.features.log_edges import LogEdges
 
 NEIGHBOURS = 5
-"""Dots whose usual shape a place has."""
+"""Dots nearest to a place that tell its shape."""
 
 _BLOCKS = 64  # of places with the same shape, along the longer side of an image
 _SHARE = 0.2  # of the outline of a dot, in edge pixels that vote for its centre
@@ -32,7 +32,8 @@ def dots_in_shapes(edges: LogEdges, known: np.ndarray, polarity: int) -> Dots:
     edges : LogEdges
         Of an image, without the edges of known dots.
     known : ndarray of float64, shape (k, 3, 3)
-        Frames of at least `NEIGHBOURS` dots, px of this image.
+        Frames of dots, px of this image: one at least. A place has the usual shape of the
+        `NEIGHBOURS` that are nearest to it, or of all where there are fewer.
     polarity : int
         1 for dark dots on bright ground, -1 for bright ones.
 

@@ -92,14 +92,14 @@ class Explained(ArrayRecord):
         found = [NO_DOTS]
         size = frame.mean_radii(self.frames) / 2**octave.level
         low, high = octave.radii
-        of_size = self.certain & (size >= low) & (size <= high)
+        of_octave = self.select(self.certain & (size >= low) & (size <= high))
         for polarity in (1, -1):
-            known_ones = of_size & (self.polarity == polarity)
-            known = self.select(known_ones)
+            known = of_octave.select(of_octave.polarity == polarity)
             if len(known.frames) < _MINIMUM_TARGETS:
                 continue
-            grown = 1 + polarity * known.shifts / frame.mean_radii(known.frames)
-            usual = float(np.median(size[known_ones])) / MAXIMUM_RADIUS
+            radii = frame.mean_radii(known.frames)
+            grown = 1 + polarity * known.shifts / radii
+            usual = float(np.median(radii)) / 2**octave.level / MAXIMUM_RADIUS
             half = int(np.clip(np.ceil(np.log2(usual)), 1, len(octave.pyramid.edges)))
             edges = octave.pyramid.edges[half - 1]
             mask = mask_of(self.outlines_in(octave.level + half), edges.marked.shape)
