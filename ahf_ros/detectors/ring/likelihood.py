@@ -23,6 +23,7 @@ from ahf_ros.detectors.ring.polar import CORRELATION, LIGHT_EDGE, PolarImages
 from ahf_ros.features.array_record import ArrayRecord
 from ahf_ros.features.circle_fit import SOFT
 from ahf_ros.features.normal import normal_integral
+from ahf_ros.features.robust import medians
 from ahf_ros.imaging.image import SATURATED
 from ahf_ros.imaging.logarithm import LOG_OFFSET
 
@@ -367,8 +368,10 @@ def level_evidence(
         seen[..., half] &= ~(levels[..., half & on_ground] >= limit).any(axis=2, keepdims=True)
     dark = levels <= polar.shade[:, None, None]
     surprise = _surprise(errors, of_paper, seen & on_ground)
+    as_ink = _as_ink(polar, level, noise, of_light, [half & on_ground for half in halves])
+    surprise_at = np.maximum(surprise, np.where(in_band, as_ink, 0))
     paper, ink, *between = (
-        np.where(seen, np.log(((1 - surprise) * of + surprise * _ANY) / anything), 0)
+        np.where(seen, np.log(((1 - surprise_at) * of + surprise_at * _ANY) / anything), 0)
         * weight[:, None, None]
         for of in densities
     )
@@ -416,6 +419,31 @@ def _predicted(best: np.ndarray, weight: np.ndarray) -> np.ndarray:
         np.add(of_step, of_gain, out=path)
     ahead, behind = bounded[:, 0] + gain, bounded[::-1, 1]
     return np.moveaxis(ahead + behind <= 0, 0, 2)
+
+
+def _as_ink(
+    polar: PolarImages,
+    level: np.ndarray,
+    noise: np.ndarray,
+    light: np.ndarray,
+    sides: Sequence[np.ndarray],
+) -> np.ndarray:
+    """Return the probabilities that predicted light, of ln (k, m, d), is dark ground, (k, m, d).
+
+    The sides, (d,) each, are of gap and margin. A plate may end beside the band. Where all ground
+    next to the band is evenly lit, light that looks like ink between two readings of it comes from
+    what lies behind the plate.
+    """
+    gap, beyond = np.flatnonzero(sides[0]), np.flatnonzero(sides[1])[:1]
+    near = np.append(gap, beyond)
+    ground, width = (of[..., near].reshape(len(of), -1) for of in (level, noise))
+    apart = np.abs(ground - medians(ground)[:, None])
+    uneven = (apart**2 > LIGHT_EDGE**2 + 4 * width**2).mean(axis=1)
+    even = SURPRISES[0] / np.clip(uneven, *SURPRISES).astype(np.float32)[:, None, None]
+    of_gap = level[..., gap].mean(axis=2, keepdims=True)
+    between = np.abs(level[..., beyond] - of_gap) < LIGHT_EDGE
+    dark = (of_gap - light) * polar.polarity[:, None, None] > LIGHT_EDGE
+    return np.where(between & dark, even, 0)
 
 
 def _surprise(errors: np.ndarray, width: np.ndarray, which: np.ndarray) -> np.ndarray:
