@@ -26,6 +26,7 @@ def made_up(x: Sequence[float], share: float = 1.0, radius: float = 10.0) -> Fit
         covariance=np.tile(np.eye(2), (count, 1, 1)),
         blur=np.full(count, 0.8),
         edge_shift=np.full(count, -0.3),
+        proportion=np.ones(count),
     )
 
 

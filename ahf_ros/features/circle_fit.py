@@ -76,6 +76,7 @@ class Fit(ArrayRecord):
     covariance: np.ndarray  # (k, 2, 2), of the image of the centre, px^2; NaN if not asked for
     blur: np.ndarray  # (k,), of the edges, standard deviation in px
     edge_shift: np.ndarray  # (k,), by which what is dark has grown, px; 0 for a single circle
+    proportion: np.ndarray  # (k,), of the first circles beyond the dot, to those of their print
 
     @property
     def size(self) -> np.ndarray:
@@ -95,7 +96,7 @@ class Fit(ArrayRecord):
 
 _NO_FRAMES, _NO_COVARIANCES = np.zeros((0, 3, 3)), np.zeros((0, 2, 2))
 NO_FITS = Fit(
-    *[_NO_FRAMES, np.zeros(0, int), *np.zeros((4, 0)), _NO_COVARIANCES, *np.zeros((2, 0))]
+    *[_NO_FRAMES, np.zeros(0, int), *np.zeros((4, 0)), _NO_COVARIANCES, *np.zeros((3, 0))]
 )
 """An empty record."""
 
@@ -211,6 +212,7 @@ def fit_circles(
         covariance=affine @ covariance @ affine.transpose(0, 2, 1) + _SYSTEMATIC**2 * np.eye(2),
         blur=blur,
         edge_shift=-solution.changes[:, -1] if projective else np.zeros(len(frames)),
+        proportion=1 + solution.changes[:, 7] if projective else np.ones(len(frames)),
     )
 
 

@@ -50,6 +50,7 @@ PER_SECTOR = 10
 """Angles of a sector at which bands are read."""
 
 _IN_PLACE = 0.75  # share of the edges of a target whose ground may end
+_PROPORTION = 0.06  # by which bands may be larger or smaller beside their dots than printed
 _THIN = 1.5  # width of a band, in deviations of blur, up to which its dot alone is measured
 _SHIFTS = np.arange(-2.4, 2.41, 0.4)  # of edges, that are tried, px
 
@@ -103,8 +104,11 @@ def _read_part(
     printed, words = printed.select(good), words.select(good)
     fit = _joint_fit(gray, printed, words, PER_SECTOR // 2, 1, family)
     fit = _by_dot(fit, printed, growth, _thin(printed, growth, family))
-    growth = fit.polarity * fit.edge_shift / fit.size
-    whole = polar_images(gray, fit, family.band, family.bits * PER_SECTOR)
+    # A dot and its band are not printed and grown alike: each is read where it was seen.
+    printed = np.abs(fit.proportion - 1) < _PROPORTION
+    bands = replace(fit, frames=frame.scaled(fit.frames, np.where(printed, fit.proportion, 1)))
+    growth = fit.polarity * fit.edge_shift / bands.size
+    whole = polar_images(gray, bands, family.band, family.bits * PER_SECTOR)
     polar = on_dark_ground(whole, family.band, fit.share > _IN_PLACE)
     edges = edge_evidence(polar, np.ones(len(read)), growth, family.band, SHARES)
     words = decode(edges, _overhang(growth, family), family, prior.expected)
@@ -115,10 +119,11 @@ def _read_part(
         return unread
     if asked.size < read.size:
         read, growth = read[asked], growth[asked]
-        fit, polar, whole = fit.select(asked), polar.select(asked), whole.select(asked)
+        fit, bands = fit.select(asked), bands.select(asked)
+        polar, whole = polar.select(asked), whole.select(asked)
         edges, words = edges.select(asked), words.select(asked)
     overhang = _overhang(growth, family)
-    words = _settled(gray, fit, polar, edges, words, growth, family, prior.expected, last=True)
+    words = _settled(gray, bands, polar, edges, words, growth, family, prior.expected, last=True)
     words = with_ends(polar, words, overhang, family)
     words = replace(words, unlike=unlike_print(whole, words, growth, overhang, family))
     good = _mean_odds(words, edges.weight) > hopeful
@@ -217,6 +222,7 @@ def _by_dot(fit: Fit, printed: Fit, growth: np.ndarray, which: np.ndarray) -> Fi
         edge_shift=shift,
         share=fit.share,
         deviation=fit.deviation,
+        proportion=np.ones(len(shift)),
         covariance=np.where(known, printed.covariance, fit.covariance),
     )
     return fit.replaced(which, alone.select(which))
