@@ -316,11 +316,13 @@ def print_network(solution: Solution, folder: str, console: Console | None = Non
     from rich.markup import escape
 
     from ahf_ros.cli.tables import print_table, terminal
-    from ahf_ros.orientation.strength import what_to_photograph
+    from ahf_ros.orientation.verdict import verdict
     from ahf_ros.report import network_summary
 
     console = console or terminal()
-    unit = solution.network.unit
+    unit, judged = solution.network.unit, verdict(solution)
+    colour = {'good': 'green', 'weak': 'yellow', 'bad': 'red'}[judged.grade]
+    console.print(f'[bold {colour}]{escape(printable(judged.line, 2000))}[/]', highlight=False)
     print_table(folder, ('', ''), network_summary.summary(solution), console)
     for index in solution.calibrated.nonzero()[0].tolist():
         rows = network_summary.camera_rows(solution, index)
@@ -336,6 +338,6 @@ def print_network(solution: Solution, folder: str, console: Console | None = Non
     if rejected := network_summary.rejected_rows(solution):
         head = 'photograph', 'target', 'x, px', 'y, px', 'residual, sigma', 'why'
         print_table(f'{len(rejected)} left out', head, rejected, console)
-    for mark, texts in (('yellow]!', solution.warnings), ('cyan]>', what_to_photograph(solution))):
+    for mark, texts in (('yellow]!', solution.warnings), ('cyan]>', judged.to_do)):
         for text in texts:
             console.print(f'[{mark}[/] {escape(printable(text, len(text)))}', highlight=False)

@@ -23,12 +23,11 @@ from ahf_ros.orientation.rejection import Adjusted, adjusted, rejections, reloca
 from ahf_ros.orientation.similarity import similarity_between
 from ahf_ros.orientation.solution import Solution, Start
 from ahf_ros.orientation.suspects import examined
-from ahf_ros.orientation.testing import CRITICAL
+from ahf_ros.orientation.testing import CRITICAL, MISFIT
 from ahf_ros.orientation.zoom import zoomed
 
 Mask = NDArray[np.bool_]
 _INNER = Datum('inner')
-_MISFIT = 3.0  # sigma0 that is no matter of weights
 _MISFITS = (
     'sigma0 is {:.1f}: image points fit so many times worse than their covariances say. Do not '
     'trust the coordinates before the reason is found: a wrong focal length or calibration, '
@@ -231,7 +230,7 @@ def _solution(network: Network, result: Adjusted, warnings: tuple[str, ...]) -> 
     normalised[every.observations] = result.lengths / np.sqrt(factor)
     warnings += undetermined(network, layout, result.state, covariance)
     warnings += unlike_given(network, result.state.calibrations)
-    if unit.sigma0 > _MISFIT:
+    if unit.sigma0 > MISFIT:
         warnings += (_MISFITS.format(unit.sigma0),)
     if not result.converged:
         warnings += ('the adjustment did not converge: its coordinates are not final',)
