@@ -60,8 +60,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default=[],
         type=parsed_by(partial(parsed_export, formats=NETWORK_FORMATS)),
         metavar='FORMAT=DIR',
-        help='Also write cameras, poses and targets for other software: colmap, metashape or '
-        'mmvii. Repeatable.',
+        help='Also write cameras, poses and targets for other software: '
+        f'{", ".join(NETWORK_FORMATS)}. Repeatable.',
     )
     add_quiet(parser)
 
@@ -277,7 +277,7 @@ def _of_groups(solutions: Sequence[Solution], number: int) -> tuple[str, ...]:
 
 def _write(solution: Solution, number: int, options: argparse.Namespace) -> bool:
     """Write a network and its exports, print what was found, and return whether all is written."""
-    from ahf_ros.interchange.export.formats import write_network_export
+    from ahf_ros.interchange.export.formats import network_remark, write_network_export
     from ahf_ros.interchange.network_results import write_network
     from ahf_ros.report.network_page import write_network_page
 
@@ -303,6 +303,9 @@ def _write(solution: Solution, number: int, options: argparse.Namespace) -> bool
             written = False
     if not options.quiet:
         print_network(solution, str(folder))
+        for name, _ in options.export:
+            if remark := network_remark(name, solution):
+                tell('orient', remark)
     try:
         write_mountings(solution, folder, options)
     except ValueError as error:

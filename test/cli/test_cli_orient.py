@@ -153,8 +153,8 @@ def test_groups_are_written_each_by_itself(
         (['--focal-length', '35 cm'], "focal_length is '35 cm', accepted is a length such as"),
         (['--focal-length', '0mm'], "focal_length is '0mm'"),
         (
-            ['--export', 'opf=x'],
-            "export is 'opf=x', accepted is FORMAT=DIR with a format of colmap",
+            ['--export', 'odm=x'],
+            "export is 'odm=x', accepted is FORMAT=DIR with a format of colmap",
         ),
         (['--sigma', '0'], "sigma is '0'"),
     ],
