@@ -65,24 +65,25 @@ def _of_targets(solution: Solution) -> Iterator[Weakness]:
     known = solution.determined
     angles = largest_angles(network, solution.start)
     rays, largest = rays_of(solution), semi_axes(solution)[:, 0]
+    found = known & ~(largest == 0)  # the others were given, and need no rays
 
     def number(chosen: np.ndarray) -> str:
         return counted(int(chosen.sum()), 'target')
 
-    if np.any(few := known & (rays < FEW_RAYS)):
+    if np.any(few := found & (rays < FEW_RAYS)):
         yield Weakness(
             f'{number(few)} with two rays',
             f'Photograph {_named(network.targets, few)} again, from another side: two rays only, '
             'so that a wrong ID is not noticed.',
         )
-    if np.any(flat := known & (angles < SMALL_ANGLE)):
+    if np.any(flat := found & (angles < SMALL_ANGLE)):
         yield Weakness(
             f'{number(flat)} with all rays within {math.degrees(SMALL_ANGLE):g} degrees',
             f'Photograph {_named(network.targets, flat)} from further to the side: all rays are '
             f'within {math.degrees(SMALL_ANGLE):g} degrees, so that the depth is uncertain.',
         )
-    typical = float(np.median(largest[known])) if known.any() else math.nan
-    weak = known & (largest > _WEAK * typical) & ~few & ~flat
+    typical = float(np.median(largest[found])) if found.any() else math.nan
+    weak = found & (largest > _WEAK * typical) & ~few & ~flat
     if np.any(weak):
         yield Weakness(
             f'{number(weak)} with {_WEAK:g} times the usual standard deviation',
@@ -146,7 +147,9 @@ def _of_scale(solution: Solution) -> Iterator[Weakness]:
     network = solution.network
     if not network.unit:
         yield Weakness('no scale', 'Add a scale bar or control points: the network has no scale.')
-    elif not any([it.check for it in network.bars] + [it.check for it in network.control]):
+        return
+    checks = [it.check for it in network.bars] + [it.check for it in network.control]
+    if not any(checks) and (semi_axes(solution)[:, 0] > 0).any():
         yield Weakness(
             NO_CHECKS,
             'Keep a scale bar or a control point as a check (role check): nothing that was not '

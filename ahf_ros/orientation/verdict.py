@@ -127,6 +127,8 @@ def undetermined_parameters(solution: Solution, camera: int) -> list[str]:
 
 def _precision(solution: Solution) -> Finding:
     number, unit = relative_precision(solution), solution.network.unit
+    if coordinate_deviation(solution) == 0:
+        return Finding('good', 'all coordinates were given as exact', 'exact coordinates')
     if not math.isfinite(number):
         return Finding('bad', 'no standard deviations are known', 'no relative precision')
     digits = 10 ** max(math.floor(math.log10(number)) - 1, 0)

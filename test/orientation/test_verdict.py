@@ -108,3 +108,17 @@ def test_parameters_that_are_not_determined_are_named() -> None:
     found = verdict(replace(whole, camera_covariances=(covariance,)))
     assert found.grade == 'good'
     assert 'do not determine k3' in ' '.join(it.text for it in found.findings)
+
+
+def test_a_board_of_exact_points_needs_no_rays_and_no_checks() -> None:
+    whole = good()
+    used = np.isin(whole.network.observations.photograph, [0, 1])
+    exact = replace(
+        whole,
+        network=replace(whole.network, bars=(), control=()),
+        start=replace(whole.start, used=used),
+        covariance_of_points=np.zeros_like(whole.covariance_of_points),
+    )
+    found = verdict(exact)
+    assert 'exact coordinates; no checks' in found.line and found.grade != 'bad'
+    assert not any('rays' in it or 'role check' in it for it in found.to_do)

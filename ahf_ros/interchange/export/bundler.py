@@ -13,10 +13,12 @@ References
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence
 
 import numpy as np
 
 from ahf_ros.interchange.export.adjusted import (
+    Seen,
     by_target,
     file_name,
     lens_of,
@@ -25,6 +27,7 @@ from ahf_ros.interchange.export.adjusted import (
 )
 from ahf_ros.interchange.files import csv_table
 from ahf_ros.orientation.camera import undistort
+from ahf_ros.orientation.network import FloatArray
 from ahf_ros.orientation.solution import Solution
 
 _COLOUR = '255 255 255'
@@ -48,13 +51,12 @@ def bundler_files(solution: Solution) -> dict[str, bytes]:
         focal = lens_of(solution, int(network.camera_of[number])).fy
         lines += [f'{focal:.15g} 0 0', *(numbers(row) for row in rotation)]
         lines.append(numbers(-rotation @ start.positions[number]))
+    every = [it for seen in tracks.values() for it in seen]
+    ideal = iter(_ideal(solution, every).tolist())
     keys: Counter[int] = Counter()
     for target, seen in tracks.items():
         views = []
-        for it in seen:
-            camera = int(network.camera_of[it.photograph])
-            ideal = undistort(start.calibrations[camera], it.xy[None])[0]
-            x, y = lens_of(solution, camera).fy * ideal * (1, -1)
+        for it, (x, y) in zip(seen, ideal, strict=False):
             views.append(f'{place[it.photograph]} {keys[it.photograph]} {x:.6f} {y:.6f}')
             keys[it.photograph] += 1
         lines += [numbers(start.points[target]), _COLOUR, ' '.join([str(len(views)), *views])]
@@ -64,6 +66,14 @@ def bundler_files(solution: Solution) -> dict[str, bytes]:
         'list.txt': _text(names),
         'bundle_labels.csv': csv_table([('point', 'id'), *labels]),
     }
+
+
+def _ideal(solution: Solution, seen: Sequence[Seen]) -> FloatArray:
+    """Return image points (n, 2) without distortion, px from the middle, y up."""
+    cameras = solution.network.camera_of[[it.photograph for it in seen]]
+    calibrations = solution.start.calibrations[cameras]
+    places = undistort(calibrations, np.array([it.xy for it in seen]).reshape(-1, 2))
+    return np.asarray(calibrations[:, :1] * places * (1, -1))
 
 
 def _text(lines: list[str]) -> bytes:

@@ -16,6 +16,7 @@ import numpy as np
 
 from ahf_ros.interchange.cloud_files import write_ply
 from ahf_ros.interchange.files import csv_table
+from ahf_ros.orientation.network import FloatArray
 from ahf_ros.orientation.points import MeasuredPoints, blocks, standard_deviations
 from ahf_ros.orientation.solution import Solution
 from ahf_ros.orientation.strength import rays_of
@@ -101,9 +102,7 @@ def jag3d_files(solution: Solution) -> dict[str, bytes]:
         raise ValueError(f'jag3d splits at blanks, accepted is a target without: {blank!r}')
     return {
         'jag3d.info': ''.join(_information(points)).encode(),
-        'jag3d.cxx': ''.join(
-            ''.join(f'{value:+35.15e}  ' for value in row) + '\n' for row in points.covariance
-        ).encode(),
+        'jag3d.cxx': _matrix(points.covariance),
         'jag3d_points.txt': ''.join(_with_own_covariance(points)).encode(),
     }
 
@@ -112,6 +111,11 @@ def _information(points: MeasuredPoints) -> Iterator[str]:
     for index, (name, xyz) in enumerate(zip(points.names, points.xyz.tolist(), strict=True)):
         for axis, value in enumerate(xyz):
             yield f'{name:>25}\t{"XYZ"[axis]:>5}\t{value:35.15f}\t{3 * index + axis:10d}\n'
+
+
+def _matrix(values: FloatArray) -> bytes:
+    line = '%+35.15e  ' * values.shape[1] + '\n'
+    return ''.join(line % tuple(row) for row in values.tolist()).encode()
 
 
 def _with_own_covariance(points: MeasuredPoints) -> Iterator[str]:
