@@ -25,6 +25,7 @@ class IdentificationOptions(DetectorOptions, total=False):
     estimate_expected: bool
     ahf: bool
     expected_ids: str
+    network_ids: str
     fusion: bool
     coarse: bool
     threads: int

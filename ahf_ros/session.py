@@ -19,7 +19,7 @@ from ahf_ros.detectors import (
     Expecting,
     Narrowing,
     Refiner,
-    check_expected_ids,
+    check_listed_ids,
     create_detector,
     estimator,
 )
@@ -86,7 +86,8 @@ def create_identifier(
         looked_for = settings.detection
         if isinstance(used, Narrowing):
             looked_for = looked_for.narrowed(used.families)
-        check_expected_ids(listed, used.name, looked_for)
+        name = 'expected_ids' if settings.adaptive.wanted else 'network_ids'
+        check_listed_ids(name, listed, used.name, looked_for)
     wanted = settings.detection.family
     families = (AUTO, used.family) if isinstance(used, Detector) else (wanted,)
     if settings.estimate_expected and wanted not in families:

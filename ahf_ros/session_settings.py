@@ -72,17 +72,23 @@ class IdentificationSettings:
         self.check_detector()
         if self.estimate_expected:
             estimator(self.detection)
-        count = len(self.adaptive.listed)
+        count = len(self.adaptive.wanted)
         if count and self.expected_targets not in (0, count):
             raise ValueError(
                 f'expected_targets is {self.expected_targets} and expected_ids has '
                 f'{counted(count, "ID")}; accepted with these is their number, or 0'
             )
+        exist = len(self.adaptive.listed)
+        if exist and self.expected_targets > exist:
+            raise ValueError(
+                f'expected_targets is {self.expected_targets} and network_ids has '
+                f'{counted(exist, "ID")}; accepted with these is at most their number'
+            )
 
     @property
     def number(self) -> int:
         """N as it is given, by a number or by IDs; 0 where it is not."""
-        return self.expected_targets or len(self.adaptive.listed)
+        return self.expected_targets or len(self.adaptive.wanted)
 
     def check_detector(self) -> None:
         """Refuse a detector that does not identify the family."""

@@ -294,7 +294,8 @@ class Identification:
     edge_shift : float, optional
         Edge shift of the image, px, as in `Target`; None where it is unknown.
     other_ids : tuple of int
-        IDs that were read but are not among `expected_ids`, in ascending order.
+        IDs that were read but are not among those that were listed as expected, or as those of
+        the network, in ascending order.
     repeated : tuple of UndecodedTarget
         Targets whose likely ID others have, too, so that none of them is reported with it.
     unsettled : tuple of UndecodedTarget

@@ -107,6 +107,19 @@ def test_an_identification_is_interrupted_between_two_trials() -> None:
             {'expected_targets': 4, 'expected_ids': '1-3'},
             'expected_targets is 4 and expected_ids has 3 IDs; accepted with these is their numb',
         ),
+        (
+            {'expected_targets': 4, 'network_ids': '1-3'},
+            'expected_targets is 4 and network_ids has 3 IDs; accepted with these is at most the',
+        ),
+        (
+            {'expected_ids': '1-3', 'network_ids': '1-9'},
+            "expected_ids is '1-3' and network_ids is '1-9', accepted is one of them",
+        ),
+        ({'network_ids': '1-x'}, "network_ids has '1-x', accepted are integers and ranges"),
+        (
+            {'family': 'metashape12', 'network_ids': '1-200'},
+            'network_ids has 162, .*accepted are IDs of metashape12 from 1 to 161',
+        ),
         ({'detector': 'magic'}, "detector is 'magic', accepted is one of auto, ring, "),
         ({'family': 'ring12'}, "family is 'ring12', accepted is one of metashape12, .*_36h11"),
         ({'detector': 'ring', 'family': 'aruco_4x4_50'}, "detector is 'ring' and family is 'aru"),

@@ -28,6 +28,7 @@ from ahf_ros.session_settings import IdentificationSettings
 from ahf_ros.settling import memory_of
 from ahf_ros.stream import identify_parts, refusal
 from ahf_ros.target import UNDECODED, Identification, Target, UndecodedTarget
+from ahf_ros.text import listed
 
 
 def identify_images(task: ImageTask, report: Report = no_report) -> ImageOutcome:
@@ -166,6 +167,9 @@ def _messages(
             'the image seems to be mirrored: most IDs are not among the expected ones, and most '
             'would be in a mirror'
         )
+    elif found.other_ids:
+        others = listed([*map(str, found.other_ids)])
+        remarks.append(f'read and left out, as these IDs are not among those given: {others}')
     remarks.append(repeated_remark(found.repeated))
     remarks.append(edge_shift_remark(found.edge_shift))
     if found.count == 0:

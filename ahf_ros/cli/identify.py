@@ -221,7 +221,7 @@ def _hint(settings: IdentificationSettings, identified: int) -> list[str]:
         return ['targets of all families were looked for']
     if not identified:
         return [f'targets of {family} were looked for; --family names others']
-    if settings.number or settings.estimate_expected:
+    if settings.number or settings.estimate_expected or settings.adaptive.listed:
         return []
 
     from ahf_ros.detectors import EarlyStopping

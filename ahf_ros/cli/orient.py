@@ -7,8 +7,9 @@ from __future__ import annotations
 
 import argparse
 import re
-from collections.abc import Callable, Sequence
-from contextlib import suppress
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
     from ahf_ros.interchange.network_files import CameraKnowledge
     from ahf_ros.interchange.observation_files import ObservedPhotograph
     from ahf_ros.orientation.network import Network
+    from ahf_ros.orientation.progress import Watcher
     from ahf_ros.orientation.solution import Solution
 
 REPORT_FILE = 'report.html'
@@ -60,8 +62,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default=[],
         type=parsed_by(partial(parsed_export, formats=NETWORK_FORMATS)),
         metavar='FORMAT=DIR',
-        help='Also write cameras, poses and targets for other software: colmap, metashape or '
-        'mmvii. Repeatable.',
+        help='Also write cameras, poses and targets for other software: '
+        f'{", ".join(NETWORK_FORMATS)}. Repeatable.',
+    )
+    parser.add_argument(
+        '--progress',
+        action=argparse.BooleanOptionalAction,
+        help='Whether to show stages, photographs and iterations on standard error: on a terminal '
+        'as one line that goes when all is done, elsewhere as lines. Default: on a terminal.',
     )
     add_quiet(parser)
 
@@ -170,7 +178,8 @@ def run(options: argparse.Namespace) -> int:
     try:
         check_mounting(options)
         network, notes = _network(options)
-        solutions = _oriented(network, options)
+        with shown_progress(options.progress, options.quiet) as watcher:
+            solutions = _oriented(network, options, watcher)
         if not solutions:
             raise ValueError('no photograph could be oriented')
     except ValueError as error:
@@ -250,13 +259,35 @@ def _in_px(length: tuple[float, str] | None) -> Callable[[int, int], float] | No
     return lambda width, height: equivalent_in_px(number, width, height)
 
 
-def _oriented(network: Network, options: argparse.Namespace) -> list[Solution]:
+@contextmanager
+def shown_progress(wanted: bool | None, quiet: bool) -> Iterator[Watcher | None]:
+    """Yield what shows the steps of an orientation, None if they are not wanted.
+
+    On a terminal they are one line that renews itself and is gone at the end. Elsewhere each
+    stage, and how much of it is done, is a line, without the iterations.
+    """
+    from ahf_ros.cli.tables import terminal
+
+    is_terminal = sys.stderr.isatty()
+    if not (is_terminal and not quiet if wanted is None else wanted):
+        yield None
+    elif is_terminal:
+        with terminal().status('') as status:
+            yield lambda progress: status.update(str(progress))
+    else:
+        yield lambda progress: None if progress.iteration else tell('orient', progress)
+
+
+def _oriented(
+    network: Network, options: argparse.Namespace, watcher: Watcher | None
+) -> list[Solution]:
     from ahf_ros.orientation.datum import Datum
     from ahf_ros.orientation.orient import orient
     from ahf_ros.orientation.solution import separated
 
     datum = Datum(*options.datum) if options.datum else Datum()
-    return separated(orient(network, datum, keep_suspects=options.keep_suspects))
+    suspects = options.keep_suspects
+    return separated(orient(network, datum, keep_suspects=suspects, progress=watcher))
 
 
 def _of_groups(solutions: Sequence[Solution], number: int) -> tuple[str, ...]:
@@ -277,7 +308,7 @@ def _of_groups(solutions: Sequence[Solution], number: int) -> tuple[str, ...]:
 
 def _write(solution: Solution, number: int, options: argparse.Namespace) -> bool:
     """Write a network and its exports, print what was found, and return whether all is written."""
-    from ahf_ros.interchange.export.formats import write_network_export
+    from ahf_ros.interchange.export.formats import network_remark, write_network_export
     from ahf_ros.interchange.network_results import write_network
     from ahf_ros.report.network_page import write_network_page
 
@@ -303,6 +334,9 @@ def _write(solution: Solution, number: int, options: argparse.Namespace) -> bool
             written = False
     if not options.quiet:
         print_network(solution, str(folder))
+        for name, _ in options.export:
+            if remark := network_remark(name, solution):
+                tell('orient', remark)
     try:
         write_mountings(solution, folder, options)
     except ValueError as error:
@@ -316,11 +350,13 @@ def print_network(solution: Solution, folder: str, console: Console | None = Non
     from rich.markup import escape
 
     from ahf_ros.cli.tables import print_table, terminal
-    from ahf_ros.orientation.strength import what_to_photograph
+    from ahf_ros.orientation.verdict import verdict
     from ahf_ros.report import network_summary
 
     console = console or terminal()
-    unit = solution.network.unit
+    unit, judged = solution.network.unit, verdict(solution)
+    colour = {'good': 'green', 'weak': 'yellow', 'bad': 'red'}[judged.grade]
+    console.print(f'[bold {colour}]{escape(printable(judged.line, 2000))}[/]', highlight=False)
     print_table(folder, ('', ''), network_summary.summary(solution), console)
     for index in solution.calibrated.nonzero()[0].tolist():
         rows = network_summary.camera_rows(solution, index)
@@ -336,6 +372,6 @@ def print_network(solution: Solution, folder: str, console: Console | None = Non
     if rejected := network_summary.rejected_rows(solution):
         head = 'photograph', 'target', 'x, px', 'y, px', 'residual, sigma', 'why'
         print_table(f'{len(rejected)} left out', head, rejected, console)
-    for mark, texts in (('yellow]!', solution.warnings), ('cyan]>', what_to_photograph(solution))):
+    for mark, texts in (('yellow]!', solution.warnings), ('cyan]>', judged.to_do)):
         for text in texts:
             console.print(f'[{mark}[/] {escape(printable(text, len(text)))}', highlight=False)

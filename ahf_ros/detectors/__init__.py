@@ -56,7 +56,7 @@ __all__ = [
     'Expecting',
     'Narrowing',
     'Refiner',
-    'check_expected_ids',
+    'check_listed_ids',
     'create_detector',
     'detector_name',
     'estimator',
@@ -223,13 +223,15 @@ def is_foreign(name: str) -> bool:
     return name in _ADDED
 
 
-def check_expected_ids(ids: Iterable[int], name: str, settings: DetectorSettings) -> None:
-    """Refuse IDs that a detector cannot report, by a ValueError.
+def check_listed_ids(
+    field: str, ids: Iterable[int], name: str, settings: DetectorSettings
+) -> None:
+    """Refuse IDs of a field that a detector cannot report, by a ValueError.
 
     Detectors that are no part of this package, also as a command, may report any.
     """
     if name in (_SEVERAL, *_ENTRIES) and name != 'command':
-        check_numbers('expected_ids', ids, settings.families, settings.family_file)
+        check_numbers(field, ids, settings.families, settings.family_file)
 
 
 def estimator(settings: DetectorSettings) -> Callable[[np.ndarray], int]:

@@ -202,7 +202,7 @@ class Identifier:
     @property
     def expected(self) -> int:
         """N, the number of coded targets in every image; 0 where it is unknown."""
-        return len(self._settings.listed) or self._expected_targets
+        return len(self._settings.wanted) or self._expected_targets
 
     @one_blas_thread()
     def seen(self, stack: ImageStack) -> list[Target]:
@@ -230,9 +230,9 @@ class Identifier:
         expected_targets : int, optional
             N, the number of coded targets in this image; where None, the N of the identifier.
             Where it is 0, N is estimated; without an estimate, no filter is tried. An estimate is
-            never below n of the image as received. Where the settings list the IDs, N is their
-            number in any case; targets with other IDs are left out, and no filter is chosen for
-            them or against them.
+            never below n of the image as received. Where the settings list the expected IDs, N is
+            their number in any case. Targets with IDs other than these, or than those of the
+            network, are left out, and no filter is chosen for them or against them.
 
         Returns
         -------
@@ -263,8 +263,8 @@ class Identifier:
         given = self._expected_targets if expected_targets is None else expected_targets
         _check_count('expected_targets', given)
         settings = self._settings
-        listed = settings.listed
-        expected = len(listed) or given
+        listed, wanted_ids = settings.listed, settings.wanted
+        expected = len(wanted_ids) or given
         estimating = not expected and self._estimate is not None
         threads = settings.threads or os.cpu_count() or 1
         with ThreadPoolExecutor(threads) if threads > 1 else nullcontext() as executor:
@@ -304,7 +304,7 @@ class Identifier:
             mirrored=self._mirrored is not None
             and is_mirrored(trials.found[choice.filter], listed, self._mirrored),
             combination=stack.names[number],
-            expected_ids=tuple(sorted(listed)),
+            expected_ids=tuple(sorted(wanted_ids)),
             search=_trace_of(choice.search, trials, stack) if choice.search else None,
             edge_shift=median_edge_shift(ordered),
             other_ids=trials.left_out(choice.filter),

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from ahf_ros.settings.parameter import check_parameters, numbers_in, parameter
+from ahf_ros.text import shown
 
 PUBLISHED, EXTENDED = 'published', 'extended'
 
@@ -172,6 +173,11 @@ class AdaptiveSettings:
         'IDs of the coded targets in every image, such as 1-54, 60; their number is N, other '
         'IDs are left out, and doubtful targets are weighed with them.',
     )
+    network_ids: str = parameter(
+        '',
+        'IDs that exist, such as 1-200, of which each image shows some: other IDs are left out, '
+        'and doubtful targets are weighed with them, but N is not their number.',
+    )
     fusion: bool = parameter(
         True,
         'Whether a search that has not found all shows the targets on which its filters agree, '
@@ -197,9 +203,20 @@ class AdaptiveSettings:
     def __post_init__(self) -> None:
         """Check every parameter."""
         check_parameters(self)
-        numbers_in('expected_ids', self.expected_ids)
+        if self.wanted and self.network_ids.strip():
+            raise ValueError(
+                f'expected_ids is {shown(self.expected_ids)} and network_ids is '
+                f'{shown(self.network_ids)}, accepted is one of them: expected_ids where every '
+                'image shows all, network_ids where it shows some'
+            )
+        numbers_in('network_ids', self.network_ids)
+
+    @property
+    def wanted(self) -> frozenset[int]:
+        """The IDs that every image should show; empty if they are unknown."""
+        return numbers_in('expected_ids', self.expected_ids)
 
     @property
     def listed(self) -> frozenset[int]:
         """The IDs that images may show; empty if they may show any."""
-        return numbers_in('expected_ids', self.expected_ids)
+        return self.wanted or numbers_in('network_ids', self.network_ids)

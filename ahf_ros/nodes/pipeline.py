@@ -64,7 +64,7 @@ def _of(last: tuple[Identification, ...]) -> str:
         if missing and counts != [0]:
             return (
                 f'lack IDs {listed(missing)} of expected_ids: leave out of expected_ids what is '
-                'not in view'
+                'not in view, or set network_ids to all if images show some of them'
             )
     if counts == [0]:
         return (

@@ -18,17 +18,18 @@ from ahf_ros.orientation.least_squares import Knowledge, minimise
 from ahf_ros.orientation.network import FloatArray, IntArray, Network, check_network
 from ahf_ros.orientation.normals import Layout
 from ahf_ros.orientation.placing import placed
+from ahf_ros.orientation.progress import stage
 from ahf_ros.orientation.refinement import NEEDED, agreeing, free_parameters
 from ahf_ros.orientation.rejection import Adjusted, adjusted, rejections, relocated, tested
 from ahf_ros.orientation.similarity import similarity_between
 from ahf_ros.orientation.solution import Solution, Start
 from ahf_ros.orientation.suspects import examined
-from ahf_ros.orientation.testing import CRITICAL
+from ahf_ros.orientation.testing import CRITICAL, MISFIT
 from ahf_ros.orientation.zoom import zoomed
+from ahf_ros.text import counted
 
 Mask = NDArray[np.bool_]
 _INNER = Datum('inner')
-_MISFIT = 3.0  # sigma0 that is no matter of weights
 _MISFITS = (
     'sigma0 is {:.1f}: image points fit so many times worse than their covariances say. Do not '
     'trust the coordinates before the reason is found: a wrong focal length or calibration, '
@@ -160,6 +161,10 @@ class _Model:
 
     def approximate(self, state: Start) -> tuple[Start, tuple[str, ...]]:
         """Return values after a robust adjustment, and warnings of photographs of other zooms."""
+        stage(
+            'robust adjustment',
+            counted(int(np.isfinite(state.positions[:, 0]).sum()), 'photograph'),
+        )
         layout = self.lay_out(state)
         state, _ = minimise(layout, state, self.known(layout), 'cauchy')
         state = replace(state, used=agreeing(self.network, state, layout))
@@ -184,6 +189,7 @@ def _tested(model: _Model, start: Start, datum: Datum, keep_suspects: bool) -> S
     alone = replace(model, network=replace(network, bars=(), control=()))
     state, warnings = alone.approximate(start)
     images, critical = tested(alone.network, state, alone.lay_out, alone.known)
+    stage('scale bars, control points and frame')
     unit = images.unit
     factor = 1.0 if unit.plausible else unit.sigma0**2
     state, first, of_known = placed(network, images.state, datum)
@@ -198,6 +204,7 @@ def _tested(model: _Model, start: Start, datum: Datum, keep_suspects: bool) -> S
     weighted = replace(
         checked.network, observations=replace(seen, covariance=factor * seen.covariance)
     )
+    stage('adjustment')
     result = replace(model, network=weighted).adjusted(state, datum)
     rejected, of_targets = rejections(network, result, critical / np.sqrt(factor))
     warnings = of_known + checked.warnings + warnings + of_targets
@@ -231,7 +238,7 @@ def _solution(network: Network, result: Adjusted, warnings: tuple[str, ...]) -> 
     normalised[every.observations] = result.lengths / np.sqrt(factor)
     warnings += undetermined(network, layout, result.state, covariance)
     warnings += unlike_given(network, result.state.calibrations)
-    if unit.sigma0 > _MISFIT:
+    if unit.sigma0 > MISFIT:
         warnings += (_MISFITS.format(unit.sigma0),)
     if not result.converged:
         warnings += ('the adjustment did not converge: its coordinates are not final',)

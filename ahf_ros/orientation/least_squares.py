@@ -17,6 +17,7 @@ import numpy as np
 from ahf_ros.orientation import normals
 from ahf_ros.orientation.network import FloatArray
 from ahf_ros.orientation.normals import Layout, Normals, Reduced
+from ahf_ros.orientation.progress import iteration
 from ahf_ros.orientation.solution import Start
 
 Loss = Literal['squares', 'cauchy']
@@ -86,7 +87,8 @@ def minimise(
     """
     damping = _FIRST_DAMPING
     enough = _CONVERGED if loss == 'squares' else _ROBUST_CONVERGED
-    for _ in range(rounds):
+    for number in range(rounds):
+        iteration(number + 1)
         lengths = normals.whitened_lengths(layout, state)
         spread = 1.0 if loss == 'squares' else max(1.0, normals.robust_spread(lengths))
         conditions = knowledge(state)

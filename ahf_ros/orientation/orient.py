@@ -16,6 +16,7 @@ from ahf_ros.orientation.datum import Datum
 from ahf_ros.orientation.lens_model import unsuitable_lenses
 from ahf_ros.orientation.network import FloatArray, IntArray, Network, once_a_photograph
 from ahf_ros.orientation.planar import principal_axes
+from ahf_ros.orientation.progress import Watcher, watched
 from ahf_ros.orientation.resection import FEWEST_POINTS
 from ahf_ros.orientation.similarity import in_principal_axes
 from ahf_ros.orientation.solution import Solution, Start
@@ -50,6 +51,7 @@ def orient(
     test: bool = True,
     *,
     keep_suspects: bool = False,
+    progress: Watcher | None = None,
 ) -> list[Solution]:
     """Orient photographs and compute targets without any approximate values, and adjust them.
 
@@ -65,6 +67,9 @@ def orient(
         Whether wrong observations are found and left out.
     keep_suspects : bool
         Whether bars and control points that contradict the photographs are used, as for `adjust`.
+    progress : callable, optional
+        Is called with each step, an `ahf_ros.orientation.progress.Progress`: stages, photographs
+        and iterations.
 
     Returns
     -------
@@ -97,7 +102,7 @@ def orient(
     >>> round(float(solution.start.calibrations[0, 0]), 2), solution.covariance_of_points.shape
     (1500.0, (60, 60))
     """
-    with one_blas_thread():
+    with one_blas_thread(), watched(progress):
         return _oriented(
             once_a_photograph(network),
             partial(adjust, datum=datum, release=release, test=test, keep_suspects=keep_suspects),

@@ -22,6 +22,7 @@ from ahf_ros.orientation.least_squares import Knowledge, minimise, normal_equati
 from ahf_ros.orientation.network import FloatArray, Network, Rejection
 from ahf_ros.orientation.normals import Layout
 from ahf_ros.orientation.precision import Precision, of_computed, precision
+from ahf_ros.orientation.progress import stage
 from ahf_ros.orientation.solution import Start
 from ahf_ros.orientation.testing import (
     CRITICAL,
@@ -174,7 +175,11 @@ def tested(
     again once.
     """
     returned = np.zeros(len(network.observations.xy), dtype=bool)
-    for _ in range(_ROUNDS):
+    seen = np.isin(
+        network.observations.photograph, np.flatnonzero(np.isfinite(state.positions[:, 0]))
+    )
+    for number in range(_ROUNDS):
+        stage('test of image points', f'round {number + 1}, {(seen & ~state.used).sum()} left out')
         result = adjusted(network, state, lay_out, known)
         every, lengths = result.every, result.lengths
         critical = CRITICAL * (1.0 if result.unit.plausible else result.tails.deviation)

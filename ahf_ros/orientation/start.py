@@ -16,6 +16,7 @@ import numpy as np
 from ahf_ros.orientation.camera import pinhole
 from ahf_ros.orientation.network import FloatArray, IntArray, Network
 from ahf_ros.orientation.planar import mirrored
+from ahf_ros.orientation.progress import stage
 from ahf_ros.orientation.refinement import refine
 from ahf_ros.orientation.resection import ALIKE, BOUND, FEWEST_POINTS, Resection, resections
 from ahf_ros.orientation.solution import Start
@@ -60,6 +61,7 @@ def starts(network: Network) -> list[Start]:
     remaining = [index for index, view in enumerate(views) if len(view.points) >= FEWEST_POINTS]
     found: list[Start] = []
     while len(remaining) >= FEWEST_PHOTOGRAPHS:
+        stage('start values', f'a beginning among {len(remaining)} photographs')
         start = _largest(network, views, remaining)
         if start is None:
             break
@@ -131,6 +133,7 @@ def _grown(
     try:
         start = _adjusted(network, start)
         while True:
+            stage('start values', f'{len(oriented(start))} of {len(among)} photographs')
             start = _intersected(network, views, start)
             chosen = _next(views, start, among, postponed, fewest)
             if not chosen and (fewest == FEWEST_POINTS or len(oriented(start)) == len(among)):

@@ -33,6 +33,9 @@ CRITICAL = 4.7
 SIGNIFICANCE = 0.05
 """Error probability of the test of the variance of unit weight."""
 
+MISFIT = 3.0
+"""sigma0 that is no matter of weights."""
+
 BY_CHANCE = 0.001
 """Error probability at which something that was told, or a second place, is named."""
 

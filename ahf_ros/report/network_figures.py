@@ -17,6 +17,8 @@ PICTURE = 300  # px, width of a figure of an image
 CELLS = 12  # columns of the map of a sensor
 NAMED = 150  # targets, above which they have no names in the figures
 _MARGIN = 28
+_STRIP = 26  # px, below a view: its scale bars
+_BAR = 120  # px, that a scale bar has at the most
 _ALONE = 0.6  # of the extent of the network, below which targets are shown alone, too
 _ELLIPSE = 0.025  # of the width of a view: size that the median ellipse is enlarged to
 _ARROW = 0.03  # of the width of an image: size that the median residual is enlarged to
@@ -29,7 +31,7 @@ def views(solution: Solution) -> list[tuple[str, str]]:
     meaning, and above is the direction in which the targets extend least. Where the targets are
     small beside the network, they are shown alone, too.
     """
-    axes, names = _axes(solution)
+    axes, names = axes_of(solution)
     points = solution.start.points[solution.determined]
     cameras = solution.start.positions[solution.oriented]
     whole, alone = _extent(np.concatenate((points, cameras)), axes), _extent(points, axes)
@@ -121,7 +123,7 @@ def sensor_map(solution: Solution, camera: int, enlarged: float) -> str:
     return _svg(scale * view.width, scale * view.height, parts, 'image')
 
 
-def _axes(solution: Solution) -> tuple[FloatArray, tuple[str, str, str]]:
+def axes_of(solution: Solution) -> tuple[FloatArray, tuple[str, str, str]]:
     """Return the directions (3, 3) that figures have to the right, up, and towards the viewer."""
     points = solution.start.points[solution.determined]
     if solution.network.control or len(points) < 3:
@@ -167,7 +169,18 @@ def _view(solution: Solution, axes: FloatArray, with_cameras: bool) -> tuple[str
             written.append((x, y))
             parts.append(f'<text x="{x + 4:.1f}" y="{y - 4:.1f}">{escape(name)}</text>')
         parts.append('</g>')
-    return _svg(*VIEW, parts, 'view'), step, enlarged
+    unit = solution.network.unit
+    parts += _scale_bar(16, scale, unit, '')
+    parts += _scale_bar(VIEW[0] // 2, scale * enlarged, unit, 'ellipses: ')
+    return _svg(VIEW[0], VIEW[1] + _STRIP, parts, 'view'), step, enlarged
+
+
+def _scale_bar(x: float, scale: float, unit: str, of: str) -> Iterator[str]:
+    """Return a bar of a round length below a view; `scale` are px for a unit."""
+    length = round_number(_BAR / scale)
+    y, end = VIEW[1] + 0.5 * _STRIP, x + scale * length
+    yield f'<path class="bar" d="M{x:.1f} {y - 4:.1f}v8m0-4H{end:.1f}m0-4v8"/>'
+    yield f'<text x="{end + 6:.1f}" y="{y + 3:.1f}">{of}{length:g} {escape(unit)}</text>'
 
 
 def _knowledge(solution: Solution, places: dict[str, FloatArray]) -> Iterator[str]:

@@ -1,4 +1,4 @@
-"""The page of a network: one HTML file without scripts."""
+"""The page of a network: one HTML file that needs nothing else."""
 
 from __future__ import annotations
 
@@ -11,23 +11,21 @@ from ahf_ros.interchange.files import write_whole
 from ahf_ros.orientation.camera import PARAMETERS
 from ahf_ros.orientation.points import correlations, standard_deviations
 from ahf_ros.orientation.solution import Solution
-from ahf_ros.orientation.strength import (
-    FEW_RAYS,
-    SMALL_ANGLE,
-    rays_of,
-    semi_axes,
-    what_to_photograph,
-)
+from ahf_ros.orientation.strength import FEW_RAYS, SMALL_ANGLE, rays_of, semi_axes
+from ahf_ros.orientation.verdict import verdict
 from ahf_ros.orientation.views import largest_angles
 from ahf_ros.report.network_figures import enlargement, image_figure, sensor_map, views
+from ahf_ros.report.network_scene import scene
 from ahf_ros.report.network_summary import (
     bar_rows,
     camera_rows,
     control_rows,
+    left_out,
     rejected_rows,
     summary,
+    unknown_rows,
 )
-from ahf_ros.report.page import page_style, page_template
+from ahf_ros.report.page import page_script, page_style, page_template, script_json
 from ahf_ros.text import decimals
 
 _PICTURES = 60  # photographs whose residuals are drawn: those with the largest ones
@@ -40,7 +38,10 @@ def write_network_page(path: Path, solution: Solution, title: str) -> None:
     A ValueError says so if the file cannot be written, or jinja2 is not installed.
     """
     text = page_template('network.html').render(
-        title=title, style=page_style('network.css'), **_content(solution)
+        title=title,
+        style=page_style('network.css'),
+        script=page_script(('network',)),
+        **_content(solution),
     )
     write_whole(path, text.encode('utf-8', 'backslashreplace'))
 
@@ -51,11 +52,13 @@ def _content(solution: Solution) -> dict[str, Any]:
     photographs = _photographs(solution)
     drawn = sorted(photographs, key=lambda it: -it['largest'])[:_PICTURES]
     shown = {it['index'] for it in drawn}
+    space = scene(solution)
     return {
         'unit': solution.network.unit,
         'summary': summary(solution),
         'warnings': solution.warnings,
-        'advice': what_to_photograph(solution),
+        'verdict': verdict(solution),
+        'scene': {'json': script_json(space), 'enlarged': space['enlarged']},
         'views': views(solution),
         'targets': _targets(solution),
         'digits': decimals(np.sqrt(np.maximum(variances[solution.determined], 0)).ravel()),
@@ -69,6 +72,8 @@ def _content(solution: Solution) -> dict[str, Any]:
         'cameras': _cameras(solution, enlarged),
         'bars': bar_rows(solution),
         'control': control_rows(solution),
+        'left_out': left_out(solution),
+        'unknown': unknown_rows(solution),
         'rejected': rejected_rows(solution),
     }
 

@@ -7,14 +7,14 @@ from collections.abc import Sequence
 import numpy as np
 
 from ahf_ros.interchange.network_results import rejections
-from ahf_ros.orientation.calibration import usual_deviations
 from ahf_ros.orientation.camera import PARAMETERS
 from ahf_ros.orientation.deviations import bar_deviations, control_deviations
 from ahf_ros.orientation.points import standard_deviations
 from ahf_ros.orientation.solution import Solution
 from ahf_ros.orientation.strength import rays_of, semi_axes
+from ahf_ros.orientation.verdict import undetermined_parameters
 from ahf_ros.orientation.views import largest_angles
-from ahf_ros.text import decimals
+from ahf_ros.text import counted, decimals
 
 Rows = Sequence[tuple[str, ...]]
 
@@ -30,7 +30,7 @@ def summary(solution: Solution) -> Rows:
         ('photographs', _of(posed)),
         ('targets', _of(known)),
         ('image points used', _of(used)),
-        ('image points left out', _left_out(solution)),
+        ('image points left out', _rejected(solution)),
         ('sigma0', f'{solution.sigma0:.3f}{scaled}'),
         ('redundancy', str(solution.redundancy)),
     ]
@@ -57,9 +57,39 @@ def _of(chosen: np.ndarray) -> str:
     return f'{number}' if number == len(chosen) else f'{number} of {len(chosen)}'
 
 
-def _left_out(solution: Solution) -> str:
-    tested = sum(it.normalised_residual is not None for it in solution.rejected)
-    return f'{tested}, expected by chance {solution.expected_rejections:.1f}'
+def _tested(solution: Solution) -> int:
+    return sum(it.normalised_residual is not None for it in solution.rejected)
+
+
+def _rejected(solution: Solution) -> str:
+    return f'{_tested(solution)}, expected by chance {solution.expected_rejections:.1f}'
+
+
+def left_out(solution: Solution) -> str:
+    """Return how many image points a test rejected, and how many chance alone rejects."""
+    number, seen = _tested(solution), len(solution.residuals)
+    return (
+        f'{number} of {counted(seen, "image point")} failed the test; chance alone rejects about '
+        f'{solution.expected_rejections:.1f} good ones of so many.'
+    )
+
+
+def unknown_rows(solution: Solution) -> list[str]:
+    """Return for each camera which parameters the photographs do not determine."""
+    rows = []
+    for camera in np.flatnonzero(solution.calibrated).tolist():
+        name = f'Camera {solution.network.cameras[camera].name}'
+        released = solution.released[camera]
+        if kept := [it for it in PARAMETERS if it not in released]:
+            rows.append(f'{name}: {", ".join(kept)} kept as given, or left out where they are 0.')
+        if unknown := undetermined_parameters(solution, camera):
+            rows.append(
+                f'{name}: the photographs hardly determine {", ".join(unknown)}. They are as '
+                'usual of lenses, with a standard deviation that is part of all others.'
+            )
+        elif released:
+            rows.append(f'{name}: the photographs determine all of {", ".join(released)}.')
+    return rows
 
 
 def camera_rows(solution: Solution, camera: int) -> Rows:
@@ -70,16 +100,16 @@ def camera_rows(solution: Solution, camera: int) -> Rows:
     rows = []
     sigmas = standard_deviations(solution.camera_covariances[camera])
     values = solution.start.calibrations[camera]
-    before = usual_deviations(solution.network.cameras[camera], values[0]).values()
-    for name, value, sigma, usual in zip(PARAMETERS, values, sigmas, before, strict=True):
+    unknown = undetermined_parameters(solution, camera)
+    for name, value, sigma in zip(PARAMETERS, values, sigmas, strict=True):
         called = f'{name}, px' if name in _IN_PX else name
         if name in solution.released[camera]:
             digits = decimals([sigma])
             ratio = '' if name in _IN_PX else f'{abs(value) / sigma:.1f}'
-            ratio = 'as usual of lenses' if sigma > usual / 2 else ratio
+            ratio = 'as usual of lenses' if name in unknown else ratio
             rows.append((called, f'{value:.{digits}f}', f'{sigma:.{digits}f}', ratio))
-        elif value:
-            rows.append((called, f'{value:.7g}', 'kept', ''))
+        else:
+            rows.append((called, f'{value:.7g}', 'kept' if value else 'left out', ''))
     return rows
 
 

@@ -242,7 +242,7 @@ def write_page(
     for result in results:
         shown = None if truth is None else truth.get(Path(result.image).name)
         advised = _advice(result, folders) if result in empty else []
-        rows.append(_json(row(result, families, settings.doubtful_below, shown, advised)))
+        rows.append(script_json(row(result, families, settings.doubtful_below, shown, advised)))
     about = {
         'families': families,
         'reach': [round(relative_reach(name), 4) for name in families],
@@ -250,7 +250,7 @@ def write_page(
         'maxSize': settings.max_size,
     }
     style = page_style('style.css')
-    script = '\n'.join((_PAGE / f'{it}.js').read_text(encoding='utf-8') for it in _SCRIPTS)
+    script = page_script(_SCRIPTS)
     taken = sum(map(len, rows)) + len(style) + len(script)
     limits = _limits(round(1e6 * settings.max_size) - taken, results)
     problems: dict[int, str] = {}
@@ -272,9 +272,10 @@ def write_page(
                 style=style,
                 script=script,
                 rows=rows,
-                about=_json(about),
+                about=script_json(about),
                 pictures=enumerate(track(executor.map(pictures_of, range(len(results))))),
-                problems=lambda: _json(dict(sorted(problems.items()))),  # known when all are done
+                # known when all are done
+                problems=lambda: script_json(dict(sorted(problems.items()))),
             ):
                 file.write(text.encode('utf-8', 'backslashreplace'))
     finally:
@@ -285,6 +286,11 @@ def write_page(
 def page_style(name: str) -> str:
     """Return the colours of all pages and the styles of one."""
     return '\n'.join((_PAGE / it).read_text(encoding='utf-8') for it in ('colours.css', name))
+
+
+def page_script(names: Iterable[str]) -> str:
+    """Return scripts of a page, in their order."""
+    return '\n'.join((_PAGE / f'{it}.js').read_text(encoding='utf-8') for it in names)
 
 
 def page_template(name: str) -> Any:
@@ -332,7 +338,7 @@ def _pictures(result: ImageResult, limit: int, folders: Sequence[Path]) -> dict[
     return pictures
 
 
-def _json(value: Any) -> str:
+def script_json(value: Any) -> str:
     """Return JSON that a script element can hold, whatever texts are in it."""
     text = json.dumps(value, separators=(',', ':'), allow_nan=False)
     return text.replace('<', '\\u003c')

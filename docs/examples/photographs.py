@@ -24,13 +24,16 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument(
         '--expected-targets', type=int, default=0, help='targets in each; 0: unknown'
     )
+    parser.add_argument('--network-ids', default='', help='IDs that exist, such as 1-54')
     parser.add_argument('--output', type=Path, default=Path('results'))
     options = parser.parse_args(arguments)
     options.output.mkdir(parents=True, exist_ok=True)
 
     # One identifier for all: it starts with the filter that worked for the photograph before.
     identifier = create_identifier(
-        family=options.family, expected_targets=options.expected_targets
+        family=options.family,
+        expected_targets=options.expected_targets,
+        network_ids=options.network_ids,
     )
     seen: Counter[int] = Counter()
     with (options.output / 'targets.csv').open('w', newline='') as file:

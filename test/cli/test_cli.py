@@ -141,6 +141,19 @@ def test_what_was_looked_for_is_said_where_nothing_is_found(folder, tmp_path, ca
     assert said.endswith('missing.png cannot be read: No such file or directory')
 
 
+def test_targets_of_a_network_are_not_missed_where_they_are_not_in_view(identify, folder):
+    every, _ = identify()
+    ids = sorted(target['id'] for target in every['targets'])
+    assert len(ids) == 6
+    listed = ','.join(map(str, {*range(1, 162)} - {ids[0]}))
+    found, errors = identify('--network-ids', listed, '--detector', 'traditional')
+    assert [target['id'] for target in found['targets']] == ids[1:]
+    assert (found['expected'], found['expected_ids'], found['search']) == (0, [], None)
+    assert f'are not among those given: {ids[0]}' in errors
+    assert 'missed' not in errors
+    assert 'N is not given' not in errors
+
+
 def test_the_former_name_of_the_number_of_targets_works_and_says_so(identify):
     for option in ('--expected-targets', '--expected'):
         found, errors = identify(option, 6, '--detector', 'traditional')

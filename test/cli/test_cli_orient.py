@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import csv
 import json
+import os
+import re
 import subprocess
 import sys
+from contextlib import suppress
 from pathlib import Path
 
 import cv2
@@ -153,8 +156,8 @@ def test_groups_are_written_each_by_itself(
         (['--focal-length', '35 cm'], "focal_length is '35 cm', accepted is a length such as"),
         (['--focal-length', '0mm'], "focal_length is '0mm'"),
         (
-            ['--export', 'opf=x'],
-            "export is 'opf=x', accepted is FORMAT=DIR with a format of colmap",
+            ['--export', 'odm=x'],
+            "export is 'odm=x', accepted is FORMAT=DIR with a format of colmap",
         ),
         (['--sigma', '0'], "sigma is '0'"),
     ],
@@ -264,3 +267,42 @@ def test_wrong_poses_of_a_robot_are_refused(tmp_path: Path, content: str, messag
     (tmp_path / 'robot.csv').write_text(content)
     with pytest.raises(ValueError, match=message):
         read_robot_poses(tmp_path / 'robot.csv')
+
+
+def test_progress_is_lines_where_it_is_asked_for_and_no_terminal(
+    results: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert status('orient', results, '-o', tmp_path, '--quiet', '--progress') == 0
+    lines = [it.removeprefix('ahf orient: ') for it in capsys.readouterr().err.splitlines()]
+    assert lines[0] == 'start values: a beginning among 8 photographs'
+    assert 'start values: 8 of 8 photographs' in lines
+    stages = list(dict.fromkeys(it.split(':')[0] for it in lines))
+    assert stages == [
+        'start values',
+        'robust adjustment',
+        'test of image points',
+        'scale bars, control points and frame',
+        'adjustment',
+    ]
+    assert not any('iteration' in it for it in lines)
+
+
+def test_progress_is_a_line_that_renews_itself_on_a_terminal(
+    results: Path, tmp_path: Path
+) -> None:
+    pty = pytest.importorskip('pty')
+    ours, theirs = pty.openpty()
+    command = [sys.executable, '-m', 'ahf_ros.cli', 'orient', str(results), '-o', str(tmp_path)]
+    shown = b''
+    with subprocess.Popen(
+        command, stdin=subprocess.DEVNULL, stdout=theirs, stderr=theirs, env=environment()
+    ) as process:
+        os.close(theirs)
+        with suppress(OSError):  # its end, on Linux
+            while more := os.read(ours, 4096):
+                shown += more
+        os.close(ours)
+    assert process.returncode == 0
+    assert re.search(rb'start values: \d of 8 photographs, iteration \d', shown)
+    assert b'\r\x1b[2K' in shown  # the line is taken back
+    assert shown.index(b'start values') < shown.index(b'relative precision')

@@ -75,7 +75,7 @@ def test_photographs(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
         (tmp_path / name).symlink_to(PANEL / name)
     (tmp_path / 'notes.txt').touch()
     output = tmp_path / 'results'
-    run('photographs.py', tmp_path, '--family', 'aicon14', '--output', output)
+    run('photographs.py', tmp_path, '--family=aicon14', '--network-ids=1-200', '--output', output)
     with (output / 'targets.csv').open() as file:
         rows = list(csv.DictReader(file))
     truth = read_truth(PANEL / 'truth.csv')

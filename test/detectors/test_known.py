@@ -141,11 +141,11 @@ def test_paper_on_paper_turns_one_id_into_another_unless_they_are_known(covered)
     assert set(read) == {RIGHT}
 
 
-def test_expected_ids_reach_the_detector(covered):
+@pytest.mark.parametrize('name', ['expected_ids', 'network_ids'])
+def test_ids_that_are_given_reach_the_detector(covered, name):
     image, truth = next((image, truth) for image, truth, blind in covered if WRONG in blind)
-    identifier = create_identifier(
-        family='metashape12', expected_ids=','.join(map(str, IDS)), ahf=False
-    )
+    given = {name: ','.join(map(str, IDS))}
+    identifier = create_identifier(family='metashape12', ahf=False, **given)
     assert WRONG not in kinds(identifier.identify(image).targets, truth)
 
 

@@ -15,7 +15,7 @@ from ahf_ros.batch.engine import SerialEngine
 from ahf_ros.batch.identification import identify_images
 from ahf_ros.batch.settling import settled_tasks
 from ahf_ros.batch.task import ImageTask
-from ahf_ros.detectors import DetectorSettings, Narrowing, check_expected_ids, create_detector
+from ahf_ros.detectors import DetectorSettings, Narrowing, check_listed_ids, create_detector
 from ahf_ros.filtering.identifier import Memory
 from ahf_ros.imaging.stack import ImageStack
 from ahf_ros.interchange.image_files import write_image
@@ -108,9 +108,9 @@ def test_each_kind_has_its_smallest_dots() -> None:
 
 
 def test_ids_of_any_family_may_be_expected() -> None:
-    check_expected_ids([150, 580], 'several', DetectorSettings(family=TWO))
+    check_listed_ids('expected_ids', [150, 580], 'several', DetectorSettings(family=TWO))
     with pytest.raises(ValueError, match='expected_ids has 587, accepted are IDs of metashape12'):
-        check_expected_ids([587], 'several', DetectorSettings(family=TWO))
+        check_listed_ids('expected_ids', [587], 'several', DetectorSettings(family=TWO))
     found = create_identifier(family=TWO, expected_targets=6).identify(BOTH)
     assert (found.count, found.expected, found.filter.applied) == (6, 6, False)
 

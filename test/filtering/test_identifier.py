@@ -467,6 +467,23 @@ def test_ids_that_are_listed_beat_a_number():
         AdaptiveSettings(expected_ids='3-1')
 
 
+def test_ids_of_a_network_are_no_number_of_targets():
+    image = np.arange(400, dtype=np.uint8).reshape(20, 20)
+
+    def detector(shown: np.ndarray) -> list[Target]:
+        numbers = [1, 2, 99] if shown is image else [1, 2, 3]
+        return [Target(number, number, 10.0 * number, 5.0, 3.0, 3.0) for number in numbers]
+
+    network = AdaptiveSettings(network_ids='1-50')
+    found = identify(image, detector, 0, network)
+    assert [target.id for target in found] == [1, 2]
+    assert (found.expected, found.expected_ids, found.other_ids) == (0, (), (99,))
+    assert (found.filter.evaluations, found.filter.applied) == (1, False)
+    numbered = identify(image, detector, 3, network)  # N is not their number, but may be given
+    assert [target.id for target in numbered] == [1, 2, 3]
+    assert (numbered.expected, numbered.filter.applied) == (3, True)
+
+
 def test_an_extended_search_tries_other_cutoffs_and_says_which():
     seen = []
 

@@ -71,7 +71,8 @@ def shown(*ids: int, expected: int = 0, listed: tuple[int, ...] = (), **more: An
         ),
         (
             [shown(7, listed=(7, 8, 9)), shown(8, listed=(7, 8, 9))],
-            'lack IDs 9 of expected_ids: leave out of expected_ids what is not in view',
+            'lack IDs 9 of expected_ids: leave out of expected_ids what is not in view, or set '
+            'network_ids to all if images show some of them',
         ),
         (
             [shown(7, listed=(7, 8)), shown(8, listed=(7, 8))],

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from ahf_ros.interchange.observation_files import read_observations
 from ahf_ros.orientation.camera import PARAMETERS, pinhole
 from ahf_ros.orientation.network import CameraView, Network, once_a_photograph
 from ahf_ros.orientation.orient import orient
+from ahf_ros.orientation.progress import Progress
 from ahf_ros.orientation.solution import Solution
 from benchmarks.network_starts import Rendered, deviations, looking, photographed
 from support import ROOT
@@ -294,3 +296,17 @@ def test_targets_on_a_line_are_refused():
     seen = photographed(points, rotations, positions, (camera,), of, calibration, random)
     with pytest.raises(ValueError, match='lie on a line'):
         orient(seen.network)
+
+
+def test_who_watches_is_told_stages_photographs_and_iterations() -> None:
+    network = taken(focal=FOCAL).network
+    seen: list[Progress] = []
+    solutions = orient(network, progress=seen.append)
+    assert np.array_equal(solutions[0].start.points, orient(network)[0].start.points)
+    assert len(seen) > len({str(it) for it in seen}) / 2 > 5
+    assert all(a != b for a, b in pairwise(seen))
+    posed = [it.done for it in seen if it.stage == 'start values' and not it.iteration]
+    assert posed[0].startswith('a beginning') and posed[-1] == '6 of 6 photographs'
+    last = [it.iteration for it in seen if it.stage == 'adjustment']
+    assert last == list(range(len(last)))
+    assert str(seen[-1]).startswith('adjustment, iteration ')

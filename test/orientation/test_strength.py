@@ -9,11 +9,7 @@ import pytest
 
 from ahf_ros.orientation.deviations import bar_deviations, control_deviations
 from ahf_ros.orientation.solution import Solution
-from ahf_ros.orientation.strength import (
-    rays_of,
-    semi_axes,
-    what_to_photograph,
-)
+from ahf_ros.orientation.strength import rays_of, semi_axes, weaknesses
 from ahf_ros.orientation.views import largest_angles
 from support.networks import known, solution
 
@@ -27,7 +23,7 @@ def used_by(number: int, photographs: list[int]) -> Solution:
 
 
 def advice(of: Solution, part: str) -> list[str]:
-    return [text for text in what_to_photograph(of) if part in text]
+    return [it.remedy for it in weaknesses(of) if part in it.remedy]
 
 
 def test_rays_and_angles_are_those_of_used_observations() -> None:

@@ -10,7 +10,7 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path, PurePath
 from pkgutil import resolve_name
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 from ahf_ros.interchange.files import write_whole
 
@@ -46,12 +46,47 @@ FORMATS: Mapping[str, Format] = {
     'csv': Format('interchange.export.tables:csv_files', 0.0, paths=True),
 }
 
-NETWORK_FORMATS: Mapping[str, str] = {
-    'colmap': 'interchange.export.colmap:colmap_model_files',
-    'metashape': 'interchange.export.xml_files:metashape_network_files',
-    'mmvii': 'interchange.export.xml_files:mmvii_network_files',
+
+@dataclass(frozen=True, slots=True)
+class NetworkFormat:
+    """A format of an adjusted network: what makes its files, and what its lens lacks.
+
+    `writer` is as in `Format`. `lacks` is 'shear', or 'affinity and shear', or empty. `paths` says
+    whether names of photographs may be the same in several folders.
+    """
+
+    writer: str
+    lacks: Literal['', 'shear', 'affinity and shear'] = ''
+    paths: bool = False
+
+
+_BOTH: Literal['affinity and shear'] = 'affinity and shear'
+_POINTS = 'interchange.export.point_files'
+
+NETWORK_FORMATS: Mapping[str, NetworkFormat] = {
+    'colmap': NetworkFormat('interchange.export.colmap:colmap_model_files', 'shear', paths=True),
+    'metashape': NetworkFormat('interchange.export.xml_files:metashape_network_files'),
+    'mmvii': NetworkFormat('interchange.export.xml_files:mmvii_network_files'),
+    'blocksexchange': NetworkFormat(
+        'interchange.export.blocks_exchange:blocks_exchange_files', 'shear'
+    ),
+    'realitycapture': NetworkFormat(
+        'interchange.export.reality_capture:reality_capture_files', _BOTH
+    ),
+    'opf': NetworkFormat('interchange.export.opf_network:opf_network_files', _BOTH, paths=True),
+    'alicevision': NetworkFormat(
+        'interchange.export.sfm_data:alicevision_files', 'shear', paths=True
+    ),
+    'openmvg': NetworkFormat('interchange.export.sfm_data:openmvg_files', _BOTH, paths=True),
+    'bundler': NetworkFormat('interchange.export.bundler:bundler_files'),
+    'ply': NetworkFormat(f'{_POINTS}:ply_files', paths=True),
+    'dxf': NetworkFormat(f'{_POINTS}:dxf_files', paths=True),
+    'vstars': NetworkFormat(f'{_POINTS}:vstars_files', paths=True),
+    'jag3d': NetworkFormat(f'{_POINTS}:jag3d_files', paths=True),
 }
-"""What makes the files of an adjusted network in each format: module below `ahf_ros`, function."""
+"""The formats of adjusted networks."""
+
+_NOTABLE = 0.02  # px, by which image points differ for a lens that lacks something
 
 
 def parsed_export(text: str, formats: Collection[str]) -> tuple[str, Path]:
@@ -111,14 +146,25 @@ def write_network_export(format_name: str, folder: Path, solution: Solution) -> 
     A ValueError says what the format cannot hold, or which file cannot be written.
     """
     solution.check_forward()
+    kind = NETWORK_FORMATS[format_name]
     names = [PurePath(it).name for it in solution.network.photographs]
-    if len(set(names)) < len(names) and format_name != 'colmap':
+    if len(set(names)) < len(names) and not kind.paths:
         raise ValueError(
             f'{format_name} knows images by their names, accepted are different names in all '
             'folders'
         )
-    writer = NETWORK_FORMATS[format_name]
-    return _written(folder, resolve_name(f'ahf_ros.{writer}')(solution))
+    return _written(folder, resolve_name(f'ahf_ros.{kind.writer}')(solution))
+
+
+def network_remark(format_name: str, solution: Solution) -> str:
+    """Return what the lens of a format lacks and by how much it matters; empty for nothing."""
+    from ahf_ros.interchange.export.adjusted import lens_loss
+
+    lacks = NETWORK_FORMATS[format_name].lacks
+    loss = lens_loss(solution, square=lacks == _BOTH) if lacks else 0.0
+    if loss < _NOTABLE:
+        return ''
+    return f'{format_name} has no {lacks}: its image points differ by up to {loss:.2f} px'
 
 
 def _written(folder: Path, files: Mapping[str, bytes]) -> tuple[Path, ...]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import uuid
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -46,28 +47,33 @@ def opf_files(survey: Survey) -> dict[str, bytes]:
         }
     fixed = [point for point in points.values() if 'geolocation' in point]
     tied = [point for point in points.values() if 'geolocation' not in point]
-    camera_list = _item('camera_list')
-    control = _item('input_control_points', {'id': camera_list['id'], 'type': 'camera_list'})
+    camera_list = opf_item('camera_list')
+    control = opf_item('input_control_points', sources=('camera_list',))
     return {
-        'project.opf': _json(
+        'project.opf': opf_json(
             'project',
-            id=_uuid('project'),
+            id=opf_uuid('project'),
             name='ahf',
             description='Coded targets, identified by ahf_ros',
             items=[camera_list, control],
         ),
-        'camera_list.json': _json('camera-list', cameras=cameras),
-        'input_control_points.json': _json('input-control-points', gcps=fixed, mtps=tied),
+        'camera_list.json': opf_json('camera-list', cameras=cameras),
+        'input_control_points.json': opf_json('input-control-points', gcps=fixed, mtps=tied),
     }
 
 
-def _item(kind: str, *sources: dict[str, str]) -> dict[str, Any]:
-    """Return an item of the project, with the file that holds it and the items it is made from."""
-    resource = {'uri': f'{kind}.json', 'format': _format(kind.replace('_', '-'))}
-    return {'id': _uuid(kind), 'type': kind, 'resources': [resource], 'sources': list(sources)}
+def opf_item(kind: str, sources: Sequence[str] = (), files: Sequence[str] = ()) -> dict[str, Any]:
+    """Return an item of a project, made from others, and the files of other kinds that hold it."""
+    resources = [
+        {'uri': f'{name}.json', 'format': _format(name.replace('_', '-'))}
+        for name in files or [kind]
+    ]
+    made_from = [{'id': opf_uuid(it), 'type': it} for it in sources]
+    return {'id': opf_uuid(kind), 'type': kind, 'resources': resources, 'sources': made_from}
 
 
-def _json(kind: str, **content: Any) -> bytes:
+def opf_json(kind: str, **content: Any) -> bytes:
+    """Return a file of a kind."""
     document = {'format': _format(kind), 'version': '1.0', **content}
     return (json.dumps(document, indent=1) + '\n').encode()
 
@@ -76,6 +82,6 @@ def _format(kind: str) -> str:
     return f'application/opf-{kind}+json'
 
 
-def _uuid(kind: str) -> str:
+def opf_uuid(kind: str) -> str:
     """Return an ID that is the same for the same input."""
     return str(uuid.uuid5(uuid.NAMESPACE_URL, f'ahf_ros/opf/{kind}'))
