@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ahf_ros.blas import one_blas_thread
 from ahf_ros.orientation import normals
-from ahf_ros.orientation.calibration import undetermined, unlike_given
+from ahf_ros.orientation.calibration import undetermined, unlike_given, unlike_pixels
 from ahf_ros.orientation.camera import PARAMETERS
 from ahf_ros.orientation.datum import Datum
 from ahf_ros.orientation.deviations import failed_checks, said
@@ -231,6 +231,7 @@ def _solution(network: Network, result: Adjusted, warnings: tuple[str, ...]) -> 
     normalised[every.observations] = result.lengths / np.sqrt(factor)
     warnings += undetermined(network, layout, result.state, covariance)
     warnings += unlike_given(network, result.state.calibrations)
+    warnings += unlike_pixels(network, layout, result.state)
     if unit.sigma0 > _MISFIT:
         warnings += (_MISFITS.format(unit.sigma0),)
     if not result.converged:
