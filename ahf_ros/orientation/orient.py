@@ -16,7 +16,7 @@ from ahf_ros.orientation.datum import Datum
 from ahf_ros.orientation.lens_model import unsuitable_lenses
 from ahf_ros.orientation.network import FloatArray, IntArray, Network, once_a_photograph
 from ahf_ros.orientation.planar import principal_axes
-from ahf_ros.orientation.resection import FEWEST_POINTS
+from ahf_ros.orientation.resection import FEWEST_POINTS, at_one_place
 from ahf_ros.orientation.similarity import in_principal_axes
 from ahf_ros.orientation.solution import Solution, Start
 from ahf_ros.orientation.start import FEWEST_PHOTOGRAPHS, oriented, reversal, starts
@@ -242,12 +242,14 @@ def _left_out(network: Network, solutions: Sequence[Solution]) -> tuple[str, ...
         posed[oriented(solution.start)] = True
         placed |= np.isfinite(solution.start.points[:, 0])
     views = views_of(network)
-    few, alike, zoomed = [], [], []
+    few, narrow, alike, zoomed = [], [], [], []
     start = solutions[0].start
     for index in np.flatnonzero(~posed).tolist():
         seen = np.isfinite(start.points[views[index].points, 0])
         if seen.sum() < FEWEST_POINTS:
             few.append(index)
+        elif at_one_place(views[index].xy[seen], views[index].sigma[seen]):
+            narrow.append(index)
         elif (factor := zoom_of(network, views[index], start)) is not None:
             zoomed.append((index, factor))
         else:
@@ -257,6 +259,11 @@ def _left_out(network: Network, solutions: Sequence[Solution]) -> tuple[str, ...
         warnings.append(
             f'{_names(network.photographs, few)}: not oriented, fewer than {FEWEST_POINTS} '
             'targets with coordinates. Take photographs between them and the others'
+        )
+    if narrow:
+        warnings.append(
+            f'{_names(network.photographs, narrow)}: not oriented, all targets are at one place '
+            'in the image. Check the identification'
         )
     if alike:
         warnings.append(
