@@ -24,7 +24,6 @@ from ahf_ros.orientation.similarity import similarity_between
 from ahf_ros.orientation.solution import Solution, Start
 from ahf_ros.orientation.suspects import examined
 from ahf_ros.orientation.testing import CRITICAL
-from ahf_ros.orientation.zoom import zoomed
 
 Mask = NDArray[np.bool_]
 _INNER = Datum('inner')
@@ -158,15 +157,14 @@ class _Model:
         """Return what is known beside the photographs."""
         return knowledge(layout, gathered(self.network, layout, datum, self.lenses))
 
-    def approximate(self, state: Start) -> tuple[Start, tuple[str, ...]]:
-        """Return values after a robust adjustment, and warnings of photographs of other zooms."""
+    def approximate(self, state: Start) -> Start:
+        """Return values after a robust adjustment."""
         layout = self.lay_out(state)
         state, _ = minimise(layout, state, self.known(layout), 'cauchy')
         state = replace(state, used=agreeing(self.network, state, layout))
         layout = self.lay_out(state)
-        warnings = zoomed(self.network, layout, state)
         spread = max(1.0, normals.robust_spread(normals.whitened_lengths(layout, state)))
-        return relocated(self.network, state, layout, CRITICAL * spread), warnings
+        return relocated(self.network, state, layout, CRITICAL * spread)
 
     def adjusted(self, state: Start, datum: Datum) -> Adjusted:
         """Return the adjustment in a datum."""
@@ -182,7 +180,7 @@ def _tested(model: _Model, start: Start, datum: Datum, keep_suspects: bool) -> S
     """Return the solution: of photographs alone, then with what of the rest they believe."""
     network = model.network
     alone = replace(model, network=replace(network, bars=(), control=()))
-    state, warnings = alone.approximate(start)
+    state = alone.approximate(start)
     images, critical = tested(alone.network, state, alone.lay_out, alone.known)
     unit = images.unit
     factor = 1.0 if unit.plausible else unit.sigma0**2
@@ -200,7 +198,7 @@ def _tested(model: _Model, start: Start, datum: Datum, keep_suspects: bool) -> S
     )
     result = replace(model, network=weighted).adjusted(state, datum)
     rejected, of_targets = rejections(network, result, critical / np.sqrt(factor))
-    warnings = of_known + checked.warnings + warnings + of_targets
+    warnings = of_known + checked.warnings + of_targets
     solution = _solution(checked.network, result, warnings)
     failed = failed_checks(solution, checked.suspects)
     return replace(
@@ -231,7 +229,7 @@ def _solution(network: Network, result: Adjusted, warnings: tuple[str, ...]) -> 
     normalised[every.observations] = result.lengths / np.sqrt(factor)
     warnings += undetermined(network, layout, result.state, covariance)
     warnings += unlike_given(network, result.state.calibrations)
-    warnings += unlike_pixels(network, layout, result.state)
+    warnings += unlike_pixels(network, layout, result.state, covariance)
     if unit.sigma0 > _MISFIT:
         warnings += (_MISFITS.format(unit.sigma0),)
     if not result.converged:
@@ -240,6 +238,7 @@ def _solution(network: Network, result: Adjusted, warnings: tuple[str, ...]) -> 
     used[layout.observations] = True
     state = replace(
         result.state,
+        calibrations=_only(result.state.calibrations, np.unique(layout.camera)),
         used=used,
         rotations=_only(result.state.rotations, layout.photographs),
         positions=_only(result.state.positions, layout.photographs),

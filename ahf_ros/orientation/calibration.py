@@ -43,7 +43,7 @@ OFF_CENTRE = 0.02
 UNDETERMINED = 0.03
 """Standard deviation over the focal length that says nothing of it."""
 
-_FAR = 5.0  # standard deviations of a focal length that was given
+_FAR = 5.0  # standard deviations of what is unlike what was given, or usual
 _SQUARE = 2e-4  # affinity and shear that pixels do not have
 _ROLLED = np.deg2rad(60)  # between photographs that separate the principal point from poses
 _FACING = 0.5  # cosine between the axes of photographs whose roll is compared
@@ -102,7 +102,9 @@ def unlike_given(network: Network, calibrations: FloatArray) -> tuple[str, ...]:
     )
 
 
-def unlike_pixels(network: Network, layout: Layout, state: Start) -> tuple[str, ...]:
+def unlike_pixels(
+    network: Network, layout: Layout, state: Start, rest: FloatArray
+) -> tuple[str, ...]:
     """Return warnings of cameras whose affinity or shear is larger than that of any sensor.
 
     The camera of DBAT's `camcal` is one: with its portraits as a camera of their own, sigma0 falls
@@ -110,12 +112,14 @@ def unlike_pixels(network: Network, layout: Layout, state: Start) -> tuple[str, 
     """
     places = [PARAMETERS.index(name) for name in ('affinity', 'shear')]
     found = np.where(layout.free[:, places], state.calibrations[:, places], 0.0)
+    sigma = np.sqrt(np.pad(np.diag(rest), (0, 1))[layout.columns[:, places]])
+    large = (np.abs(found) > _SQUARE) & (np.abs(found) > _FAR * sigma)
     return tuple(
         f'camera {network.cameras[camera].name}: affinity {found[camera, 0]:.5f} and shear '
         f'{found[camera, 1]:.5f} are more than those of any sensor. They fit the photographs, but '
         'may stand for a lens that moves between them. If it was rolled, give photographs in '
         'landscape and in portrait as two cameras, and compare sigma0'
-        for camera in np.flatnonzero((np.abs(found) > _SQUARE).any(axis=1))
+        for camera in np.flatnonzero(large.any(axis=1))
     )
 
 

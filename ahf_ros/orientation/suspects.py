@@ -333,7 +333,9 @@ def _unchecked(closures: Misclosures, used: IntArray) -> str:
     """Return that nothing checks what is known."""
     names = [closures.names[it] for it in used]
     them, are = ('it', 'is') if len(names) == 1 else ('them', 'are')
-    return f'{", ".join(names)} {are} believed: nothing checks {them}. Give another one, or a check'
+    return (
+        f'{", ".join(names)} {are} believed: nothing checks {them}. Give another one, or a check'
+    )
 
 
 def _inseparable(closures: Misclosures, used: IntArray) -> tuple[str, ...]:

@@ -1,4 +1,8 @@
-"""Photographs of a camera that were taken with another zoom or focus than the rest."""
+"""Photographs of a camera that were taken with another zoom or focus than the rest.
+
+Each gets a camera of its own, which starts where the photograph alone fits. Afterwards cameras
+whose focal lengths are the same to within their precision are one again.
+"""
 
 from __future__ import annotations
 
@@ -7,71 +11,127 @@ from dataclasses import replace
 
 import numpy as np
 
-from ahf_ros.orientation import normals
-from ahf_ros.orientation.network import Network
-from ahf_ros.orientation.normals import Layout
+from ahf_ros.orientation.network import FloatArray, IntArray, Network
 from ahf_ros.orientation.refinement import refine
 from ahf_ros.orientation.resection import FEWEST_POINTS, Resection, resections
 from ahf_ros.orientation.solution import Solution, Start
 from ahf_ros.orientation.triples import STEPS
 from ahf_ros.orientation.views import View, lengths_of, spread_of
 
-OWN_CAMERA = 'Photographs of another zoom need a camera of their own'
-
 _ZOOMED = 0.01  # change of a photograph's focal length that is another zoom
 _SUSPECT = 0.8  # share of a photograph's observations that agree, below which its zoom is tested
 _LARGE_SPREAD = 3.0  # of residuals, in standard deviations, from which on all zooms are tested
 _GROUPS = 0.03  # the same between groups of photographs, each with a lens of its own
 _FITS = 6.0  # robust spread of a photograph, in those of the network, that its own zoom reaches
+_SAME = 4.0  # standard deviations between focal lengths that may be one
 
 
-def zoomed(network: Network, layout: Layout, state: Start) -> tuple[str, ...]:
-    """Return warnings of photographs whose focal length is not that of their camera.
+def with_own_zooms(
+    network: Network, views: Sequence[View], start: Start, among: Sequence[int]
+) -> tuple[Network, Start] | None:
+    """Return a network in which photographs of another zoom have a camera each, and its values.
 
-    Photographs of which a fifth disagrees, or all where residuals are large throughout, get a
-    focal length of their own each.
+    Of the photographs `among`, those are tested of which a fifth disagrees, or all where residuals
+    are large throughout, and those without a pose. None where no zoom differs.
     """
-    observations = network.observations
-    everything = np.bincount(observations.photograph, minlength=len(network.photographs))
-    agrees = np.bincount(observations.photograph[state.used], minlength=len(everything))
-    suspect = agrees < _SUSPECT * everything
-    if normals.robust_spread(normals.whitened_lengths(layout, state)) > _LARGE_SPREAD:
-        suspect[:] = True
-    own = np.intersect1d(np.flatnonzero(suspect), layout.photographs)
-    if not len(own):
-        return ()
+    lengths, photograph = lengths_of(network, start), network.observations.photograph
+    posed = np.isfinite(start.positions[:, 0])
+    known = np.bincount(photograph[~np.isnan(lengths)], minlength=len(posed))
+    agree = np.bincount(photograph[start.used], minlength=len(posed))
+    suspect = posed & ((agree < _SUSPECT * known) | (spread_of(lengths) > _LARGE_SPREAD))
+    focal = start.calibrations[network.camera_of, 0]
+    if suspect.any():
+        own = np.flatnonzero(suspect)
+        freed = refine(*_divided(network, start, own, focal[own]), ('f',))
+        focal[own] = freed.calibrations[len(network.cameras) :, 0]
+        for camera in np.unique(network.camera_of[own]):
+            mine = posed & (network.camera_of == camera)
+            start.calibrations[camera, 0] = np.median(focal[mine])
+        start = replace(freed, calibrations=start.calibrations)
+    for index in among:
+        if not posed[index] and (factor := _zoom_of(network, views[index], start)) is not None:
+            focal[index] *= factor
+    other = np.abs(focal / start.calibrations[network.camera_of, 0] - 1) > _ZOOMED
+    own = np.flatnonzero(suspect | other)
+    return _divided(network, start, own, focal[own]) if other.any() else None
+
+
+def _divided(
+    network: Network, start: Start, own: IntArray, focal: FloatArray
+) -> tuple[Network, Start]:
+    """Return a network in which some photographs have a camera each, of these focal lengths."""
     camera_of, usual = network.camera_of.copy(), network.camera_of[own]
     camera_of[own] = len(network.cameras) + np.arange(len(own))
-    views = network.cameras + tuple(
-        replace(network.cameras[place], fixed=False) for place in usual
-    )
-    freed = refine(
-        replace(network, cameras=views, camera_of=camera_of),
+    views = tuple(
         replace(
-            state,
-            calibrations=np.concatenate([state.calibrations, state.calibrations[usual]]),
-            used=state.used | np.isin(observations.photograph, own),
-        ),
-        ('f',),
+            network.cameras[camera],
+            name=f'{network.cameras[camera].name} ({network.photographs[index]})',
+            focal_length=None,
+            calibration=None,
+            fixed=False,
+        )
+        for index, camera in zip(own, usual, strict=True)
     )
-    better = np.bincount(observations.photograph[freed.used], minlength=len(everything))[own]
-    focal = freed.calibrations[camera_of[layout.photographs], 0]
+    lenses = start.calibrations[usual]
+    lenses[:, 0] = focal
+    used = start.used | np.isin(network.observations.photograph, own)
+    calibrations = np.concatenate([start.calibrations, lenses])
+    return (
+        replace(network, cameras=network.cameras + views, camera_of=camera_of),
+        replace(start, calibrations=calibrations, used=used),
+    )
+
+
+def with_common_zooms(network: Network, solution: Solution) -> tuple[Network, Start]:
+    """Return a divided network whose cameras of one focal length are one again, and its values.
+
+    `network` is the one that was not divided.
+    """
+    divided, start = solution.network, solution.start
+    sigma = np.sqrt([covariance[0, 0] for covariance in solution.camera_covariances])
+    one_of = np.arange(len(divided.cameras))
+    for camera in range(len(network.cameras)):
+        mine = np.unique(divided.camera_of[network.camera_of == camera])
+        mine = mine[sigma[mine] > 0]
+        order = mine[np.argsort(start.calibrations[mine, 0], kind='stable')]
+        cluster: list[int] = []
+        for each in order:
+            precise = min(cluster, key=sigma.__getitem__, default=each)
+            focal = start.calibrations[each, 0]
+            apart = abs(focal - start.calibrations[precise, 0])
+            near = apart < min(_SAME * np.hypot(sigma[each], sigma[precise]), _ZOOMED * focal)
+            cluster = [*cluster, int(each)] if near else [int(each)]
+            one_of[cluster] = min(cluster)
+    used, camera_of = np.unique(one_of[divided.camera_of], return_inverse=True)
+    cameras = tuple(divided.cameras[place] for place in used)
+    return (
+        replace(divided, cameras=cameras, camera_of=camera_of),
+        replace(start, calibrations=start.calibrations[used]),
+    )
+
+
+def of_other_zooms(network: Network, solution: Solution) -> tuple[str, ...]:
+    """Return warnings of photographs that got another camera than in the network."""
+    own = solution.network
+    names = [own.cameras[camera].name for camera in own.camera_of]
+    usual = [network.cameras[camera].name for camera in network.camera_of]
     warnings = []
-    for camera in np.unique(usual):
-        middle = np.median(focal[network.camera_of[layout.photographs] == camera])
-        relative = freed.calibrations[len(network.cameras) :, 0] / middle - 1
-        other = (usual == camera) & (np.abs(relative) > _ZOOMED)
-        other &= better >= _SUSPECT * everything[own]
-        if other.any():
+    for camera, view in enumerate(network.cameras):
+        mine = solution.oriented & (network.camera_of == camera)
+        other = np.flatnonzero(mine & (np.array(names) != np.array(usual)))
+        if len(other):
+            lengths = solution.start.calibrations[own.camera_of[mine], 0]
             warnings.append(
-                f'camera {network.cameras[camera].name}: {other.sum()} photographs, such as '
-                f'{network.photographs[own[other][0]]}, have another focal length than the rest. '
-                + OWN_CAMERA
+                f'camera {view.name}: {len(other)} of {mine.sum()} photographs, such as '
+                f'{network.photographs[other[0]]}, have another focal length than the rest: from '
+                f'{lengths.min():.0f} to {lengths.max():.0f} px. They have '
+                f'{len(set(own.camera_of[other].tolist()))} cameras of their own. Without zoom or '
+                'focus in between, coordinates are more precise'
             )
     return tuple(warnings)
 
 
-def zoom_of(network: Network, view: View, start: Start) -> float | None:
+def _zoom_of(network: Network, view: View, start: Start) -> float | None:
     """Return a photograph's focal length over its camera's where it alone fits, or None."""
     calibration = start.calibrations[view.camera]
     seen = np.isfinite(start.points[view.points, 0])
@@ -98,20 +158,20 @@ def zoom_of(network: Network, view: View, start: Start) -> float | None:
     return best if abs(best - 1) > _ZOOMED and alone < _FITS and alone < own / 3 else None
 
 
-def zooms_of_groups(solutions: Sequence[Solution]) -> tuple[str, ...]:
+def zooms_of_groups(network: Network, solutions: Sequence[Solution]) -> tuple[str, ...]:
     """Return warnings of cameras whose focal length differs between groups of photographs."""
-    network = solutions[0].network
     warnings = []
-    for camera, view in enumerate(network.cameras):
+    for view in network.cameras:
         lengths = [
             float(solution.start.calibrations[camera, 0])
             for solution in solutions
-            if np.any(network.camera_of[solution.oriented] == camera)
+            for camera in np.unique(solution.network.camera_of[solution.oriented])
+            if solution.network.cameras[camera].name == view.name
         ]
         if lengths and max(lengths) > (1 + _GROUPS) * min(lengths):
             text = ', '.join(f'{length:.0f}' for length in lengths)
             warnings.append(
                 f'camera {view.name}: its focal length is {text} px in groups of photographs. '
-                + OWN_CAMERA
+                'Photographs of another zoom need a camera of their own'
             )
     return tuple(warnings)
