@@ -13,7 +13,7 @@ from itertools import islice
 
 import numpy as np
 
-from ahf_ros.orientation.camera import pinhole
+from ahf_ros.orientation.camera import known_calibration
 from ahf_ros.orientation.network import FloatArray, IntArray, Network
 from ahf_ros.orientation.planar import mirrored
 from ahf_ros.orientation.refinement import refine
@@ -21,7 +21,6 @@ from ahf_ros.orientation.resection import ALIKE, BOUND, FEWEST_POINTS, Resection
 from ahf_ros.orientation.solution import Start
 from ahf_ros.orientation.triangulation import intersect
 from ahf_ros.orientation.triples import (
-    STEPS,
     WEAK,
     focal_sigma,
     known_calibrations,
@@ -29,7 +28,7 @@ from ahf_ros.orientation.triples import (
     with_lens,
 )
 from ahf_ros.orientation.views import View, lengths_of, spread_of, views_of
-from ahf_ros.orientation.zoom import with_own_zooms
+from ahf_ros.orientation.zoom import with_own_focal, with_own_zooms
 
 MOST_SEEDS = 5
 
@@ -226,34 +225,20 @@ def _pose(
 ) -> tuple[Resection | None, FloatArray]:
     """Return the pose of a photograph and its calibration; None while it is not certain.
 
-    Where nothing is known of its camera, focal lengths are scanned.
+    Where nothing is known of its camera, its focal length is searched.
     """
     calibration = start.calibrations[view.camera]
     seen = np.isfinite(start.points[view.points, 0])
-    if np.isfinite(calibration[0]):
-        poses = _poses(view, start, seen, calibration, spread)
+    taken = np.isfinite(start.positions[network.camera_of == view.camera, 0])
+    if taken.any() or np.isfinite(known_calibration(network.cameras[view.camera])[0]):
+        xy, sigma = view.normalised(start.calibrations)
+        poses = resections(start.points[view.points[seen]], xy[seen], sigma[seen] * spread)
     else:
-        camera = network.cameras[view.camera]
-        width = max(camera.width, camera.height)
-        tried = [pinhole(step * width, camera.width, camera.height) for step in STEPS]
-        each = [(_poses(view, start, seen, one, spread), one) for one in tried]
-        able = [(poses, one) for poses, one in each if poses]
-        if not able:
-            return None, calibration
-        poses, calibration = min(able, key=lambda pair: pair[0][0].scale * pair[1][0])
+        poses, calibration = with_own_focal(network, view, start, spread)
     if not poses or poses[0].agrees.sum() < max(fewest, seen.sum() / 2):
         return None, calibration
     doubtful = len(poses) > 1 and poses[1].chi_square < poses[0].chi_square + ALIKE
     return (None if doubtful else poses[0]), calibration
-
-
-def _poses(
-    view: View, start: Start, seen: FloatArray, calibration: FloatArray, spread: float
-) -> list[Resection]:
-    calibrations = start.calibrations.copy()
-    calibrations[view.camera] = calibration
-    xy, sigma = view.normalised(calibrations)
-    return resections(start.points[view.points[seen]], xy[seen], sigma[seen] * spread)
 
 
 def _with_pose(

@@ -8,20 +8,24 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 
+from ahf_ros.orientation.camera import pinhole
 from ahf_ros.orientation.network import FloatArray, IntArray, Network
 from ahf_ros.orientation.refinement import refine
 from ahf_ros.orientation.resection import FEWEST_POINTS, Resection, resections
 from ahf_ros.orientation.solution import Solution, Start
-from ahf_ros.orientation.triples import STEPS
+from ahf_ros.orientation.triples import LENS, STEPS
 from ahf_ros.orientation.views import View, lengths_of, spread_of
 
 _ZOOMED = 0.01  # change of a photograph's focal length that is another zoom
 _SUSPECT = 0.8  # share of a photograph's observations that agree, below which its zoom is tested
 _LARGE_SPREAD = 3.0  # of residuals, in standard deviations, from which on all zooms are tested
 _GROUPS = 0.03  # the same between groups of photographs, each with a lens of its own
+_HALVINGS = 8  # of steps between focal lengths, to 0.06 %
+_TRIED = 8  # photographs without a pose whose zoom is tested
 _FITS = 6.0  # robust spread of a photograph, in those of the network, that its own zoom reaches
 _SAME = 4.0  # standard deviations between focal lengths that may be one
 
@@ -31,35 +35,39 @@ def with_own_zooms(
 ) -> tuple[Network, Start] | None:
     """Return a network in which photographs of another zoom have a camera each, and its values.
 
-    Of the photographs `among`, those are tested of which a fifth disagrees, or all where residuals
-    are large throughout, and those without a pose. None where no zoom differs.
+    Those are tested of which a fifth disagrees, or all where residuals are large throughout, and
+    of those `among` that have no pose a few. All of them get one. None where no zoom differs.
     """
     lengths, photograph = lengths_of(network, start), network.observations.photograph
     posed = np.isfinite(start.positions[:, 0])
     known = np.bincount(photograph[~np.isnan(lengths)], minlength=len(posed))
     agree = np.bincount(photograph[start.used], minlength=len(posed))
     suspect = posed & ((agree < _SUSPECT * known) | (spread_of(lengths) > _LARGE_SPREAD))
-    focal = start.calibrations[network.camera_of, 0]
+    lenses, calibrations = start.calibrations[network.camera_of], start.calibrations.copy()
     if suspect.any():
         own = np.flatnonzero(suspect)
-        freed = refine(*_divided(network, start, own, focal[own]), ('f',))
-        focal[own] = freed.calibrations[len(network.cameras) :, 0]
+        divided, freed = _divided(network, start, own, lenses[own])
+        for free in (('f',), *LENS):
+            freed = refine(divided, freed, free)
+        lenses[own] = freed.calibrations[len(network.cameras) :]
         for camera in np.unique(network.camera_of[own]):
-            mine = posed & (network.camera_of == camera)
-            start.calibrations[camera, 0] = np.median(focal[mine])
-        start = replace(freed, calibrations=start.calibrations)
-    for index in among:
-        if not posed[index] and (factor := _zoom_of(network, views[index], start)) is not None:
-            focal[index] *= factor
-    other = np.abs(focal / start.calibrations[network.camera_of, 0] - 1) > _ZOOMED
-    own = np.flatnonzero(suspect | other)
-    return _divided(network, start, own, focal[own]) if other.any() else None
+            mine = lenses[posed & (network.camera_of == camera)]
+            calibrations[camera] = np.median(mine, axis=0)
+        start = replace(freed, calibrations=calibrations)
+    other = np.abs(lenses[:, 0] / calibrations[network.camera_of, 0] - 1) > _ZOOMED
+    rest = np.array([index for index in among if not posed[index]], int)
+    most = sorted(rest, key=lambda index: -len(views[index].points))[:_TRIED]
+    if other.any() or any(_is_zoomed(network, views[index], start) for index in most):
+        own = np.union1d(np.flatnonzero(suspect), rest)
+        lenses[rest] = calibrations[network.camera_of[rest]]
+        return _divided(network, start, own, lenses[own])
+    return None
 
 
 def _divided(
-    network: Network, start: Start, own: IntArray, focal: FloatArray
+    network: Network, start: Start, own: IntArray, lenses: FloatArray
 ) -> tuple[Network, Start]:
-    """Return a network in which some photographs have a camera each, of these focal lengths."""
+    """Return a network in which some photographs have a camera each, with these calibrations."""
     camera_of, usual = network.camera_of.copy(), network.camera_of[own]
     camera_of[own] = len(network.cameras) + np.arange(len(own))
     views = tuple(
@@ -72,8 +80,6 @@ def _divided(
         )
         for index, camera in zip(own, usual, strict=True)
     )
-    lenses = start.calibrations[usual]
-    lenses[:, 0] = focal
     used = start.used | np.isin(network.observations.photograph, own)
     calibrations = np.concatenate([start.calibrations, lenses])
     return (
@@ -131,31 +137,45 @@ def of_other_zooms(network: Network, solution: Solution) -> tuple[str, ...]:
     return tuple(warnings)
 
 
-def _zoom_of(network: Network, view: View, start: Start) -> float | None:
-    """Return a photograph's focal length over its camera's where it alone fits, or None."""
-    calibration = start.calibrations[view.camera]
-    seen = np.isfinite(start.points[view.points, 0])
-    if not np.isfinite(calibration[0]) or seen.sum() <= FEWEST_POINTS:
-        return None
-    spread = spread_of(lengths_of(network, start))
+def with_own_focal(
+    network: Network, view: View, start: Start, spread: float
+) -> tuple[list[Resection], FloatArray]:
+    """Return the poses of a photograph of an unknown zoom, and the calibration that fits best."""
+    camera, seen = network.cameras[view.camera], np.isfinite(start.points[view.points, 0])
+    lens = start.calibrations[view.camera]
+    if not np.isfinite(lens[0]):
+        lens = pinhole(max(camera.width, camera.height), camera.width, camera.height)
 
-    def fit(factor: float) -> tuple[float, Resection | None]:
-        changed = start.calibrations.copy()
-        changed[view.camera, 0] *= factor
-        xy, sigma = view.normalised(changed)
+    @cache
+    def fit(focal: float) -> tuple[list[Resection], FloatArray]:
+        calibrations = start.calibrations.copy()
+        calibrations[view.camera] = focal, *lens[1:]
+        xy, sigma = view.normalised(calibrations)
         poses = resections(start.points[view.points[seen]], xy[seen], sigma[seen] * spread)
-        return (poses[0].scale, poses[0]) if poses else (np.inf, None)
+        return poses, calibrations[view.camera]
 
-    camera = network.cameras[view.camera]
-    width = max(camera.width, camera.height)
-    factors = list(STEPS * width / calibration[0])
-    best = min(factors, key=lambda factor: fit(factor)[0])
+    def scale(focal: float) -> float:
+        poses = fit(focal)[0]
+        return poses[0].scale if poses else np.inf
+
+    best = min(STEPS * max(camera.width, camera.height), key=scale)
     step = STEPS[1] / STEPS[0]
-    for _ in range(6):
+    for _ in range(_HALVINGS):
         step = np.sqrt(step)
-        best = min((best / step, best, best * step), key=lambda factor: fit(factor)[0])
-    alone, own = fit(best)[0], fit(1.0)[0]
-    return best if abs(best - 1) > _ZOOMED and alone < _FITS and alone < own / 3 else None
+        best = min((best / step, best, best * step), key=scale)
+    return fit(best)
+
+
+def _is_zoomed(network: Network, view: View, start: Start) -> bool:
+    """Return whether only another focal length than that of its camera fits a photograph."""
+    seen = np.isfinite(start.points[view.points, 0])
+    if not np.isfinite(start.calibrations[view.camera, 0]) or seen.sum() <= FEWEST_POINTS:
+        return False
+    spread = spread_of(lengths_of(network, start))
+    poses, _ = with_own_focal(network, view, start, spread)
+    xy, sigma = view.normalised(start.calibrations)
+    usual = resections(start.points[view.points[seen]], xy[seen], sigma[seen] * spread)
+    return bool(poses) and poses[0].scale < min([_FITS, *(it.scale / 3 for it in usual[:1])])
 
 
 def zooms_of_groups(network: Network, solutions: Sequence[Solution]) -> tuple[str, ...]:
