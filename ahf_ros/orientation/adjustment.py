@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ahf_ros.blas import one_blas_thread
 from ahf_ros.orientation import normals
 from ahf_ros.orientation.calibration import undetermined, unlike_given, unlike_pixels
-from ahf_ros.orientation.camera import PARAMETERS
+from ahf_ros.orientation.camera import PARAMETERS, parameters_of
 from ahf_ros.orientation.datum import Datum
 from ahf_ros.orientation.deviations import failed_checks, said
 from ahf_ros.orientation.knowledge import gathered, kind, knowledge
@@ -112,6 +112,8 @@ def adjust(
     True
     """
     check_network(network)
+    if backward and any(view.equidistant for view in network.cameras):
+        raise ValueError('backward is True, accepted is False for equidistant fisheye lenses')
     try:
         with one_blas_thread():
             free = free_parameters(network, PARAMETERS if release is None else release)
@@ -250,7 +252,10 @@ def _solution(network: Network, result: Adjusted, warnings: tuple[str, ...]) -> 
         residuals,
         normalised,
         _of_cameras(layout, covariance),
-        tuple(tuple(np.array(PARAMETERS)[mask].tolist()) for mask in layout.free),
+        tuple(
+            tuple(np.array(parameters_of(view))[mask].tolist())
+            for view, mask in zip(network.cameras, layout.free, strict=True)
+        ),
         poses,
         points,
         unit.sigma0,

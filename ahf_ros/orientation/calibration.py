@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ahf_ros.orientation.camera import PARAMETERS, known_calibration
+from ahf_ros.orientation.camera import PARAMETERS, known_calibration, parameters_of
 from ahf_ros.orientation.network import CameraView, FloatArray, IntArray, Network
 from ahf_ros.orientation.normals import Layout
 from ahf_ros.orientation.solution import Start
@@ -51,13 +51,15 @@ _COMPARED = 100  # photographs of a camera whose roll is compared, spread evenly
 
 
 def usual_deviations(view: CameraView, focal_length: float) -> dict[str, float]:
-    """Return the standard deviations of what is usual of a camera, in the order of `PARAMETERS`.
+    """Return the standard deviations of what is usual of a camera, in the order of its parameters.
 
     Its focal length in px counts where none is given.
     """
     given, off = known_calibration(view)[0], OFF_CENTRE * max(view.width, view.height)
     f = FOCAL_LENGTH * given if np.isfinite(given) else UNKNOWN_FOCAL_LENGTH * focal_length
-    return {'f': float(f), 'cx': off, 'cy': off, **USUAL}
+    usual = {**USUAL, 'k4': USUAL['k3'], '': 0.0}
+    known = {'f': float(f), 'cx': off, 'cy': off}
+    return {name: known.get(name) or usual[name] for name in parameters_of(view)}
 
 
 def usual(

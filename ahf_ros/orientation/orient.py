@@ -13,7 +13,11 @@ from ahf_ros.blas import one_blas_thread
 from ahf_ros.orientation.adjustment import adjust
 from ahf_ros.orientation.calibration import UNDETERMINED
 from ahf_ros.orientation.datum import Datum
-from ahf_ros.orientation.lens_model import unsuitable_lenses
+from ahf_ros.orientation.lens_model import (
+    fisheye_lenses,
+    unsuitable_lenses,
+    with_fisheye_lenses,
+)
 from ahf_ros.orientation.network import FloatArray, IntArray, Network, once_a_photograph
 from ahf_ros.orientation.planar import principal_axes
 from ahf_ros.orientation.resection import FEWEST_POINTS, at_one_place
@@ -120,10 +124,15 @@ def _oriented(network: Network, adjusted: Callable[[Network, Start], Solution]) 
             if len(divided.cameras) > len(network.cameras):
                 common = adjusted(*with_common_zooms(network, solution))
                 solution = common if common.sigma0 < WORSE * solution.sigma0 else solution
+            if (fisheye := with_fisheye_lenses(solution)) is not None:
+                other = adjusted(*fisheye)
+                solution = (
+                    other if other.start.used.sum() > solution.start.used.sum() else solution
+                )
             reason = _doubtful(solution)
         if reason is None:
             warnings = solution.warnings + unsuitable_lenses(solution)
-            warnings += of_other_zooms(network, solution)
+            warnings += of_other_zooms(network, solution) + fisheye_lenses(network, solution)
             solutions.append(replace(solution, warnings=warnings))
         else:
             refused.append(reason)

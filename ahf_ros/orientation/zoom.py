@@ -17,7 +17,7 @@ from ahf_ros.orientation.network import FloatArray, IntArray, Network
 from ahf_ros.orientation.refinement import refine
 from ahf_ros.orientation.resection import FEWEST_POINTS, Resection, resections
 from ahf_ros.orientation.solution import Solution, Start
-from ahf_ros.orientation.triples import LENS, STEPS
+from ahf_ros.orientation.triples import LENS, STEPS, focal_steps
 from ahf_ros.orientation.views import View, lengths_of, spread_of
 
 _ZOOMED = 0.01  # change of a photograph's focal length that is another zoom
@@ -158,7 +158,7 @@ def with_own_focal(
         poses = fit(focal)[0]
         return poses[0].scale if poses else np.inf
 
-    best = min(STEPS * max(camera.width, camera.height), key=scale)
+    best = min(focal_steps(camera), key=scale)
     step = STEPS[1] / STEPS[0]
     for _ in range(_HALVINGS):
         step = np.sqrt(step)

@@ -8,7 +8,6 @@ import numpy as np
 
 from ahf_ros.interchange.network_results import rejections
 from ahf_ros.orientation.calibration import usual_deviations
-from ahf_ros.orientation.camera import PARAMETERS
 from ahf_ros.orientation.deviations import bar_deviations, control_deviations
 from ahf_ros.orientation.points import standard_deviations
 from ahf_ros.orientation.solution import Solution
@@ -70,8 +69,8 @@ def camera_rows(solution: Solution, camera: int) -> Rows:
     rows = []
     sigmas = standard_deviations(solution.camera_covariances[camera])
     values = solution.start.calibrations[camera]
-    before = usual_deviations(solution.network.cameras[camera], values[0]).values()
-    for name, value, sigma, usual in zip(PARAMETERS, values, sigmas, before, strict=True):
+    before = usual_deviations(solution.network.cameras[camera], values[0]).items()
+    for (name, usual), value, sigma in zip(before, values, sigmas, strict=True):
         called = f'{name}, px' if name in _IN_PX else name
         if name in solution.released[camera]:
             digits = decimals([sigma])

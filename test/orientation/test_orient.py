@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
 
@@ -114,7 +115,7 @@ def test_the_frame_is_that_of_the_principal_axes():
     assert (solution.start.positions[:, 2] > 0).all()
 
 
-def test_a_fisheye_lens_is_named():
+def test_a_fisheye_lens_is_fitted():
     seen = taken(count=8, focal=1000.0, number=60)
     network = seen.network
     source = np.random.default_rng(9)
@@ -136,8 +137,13 @@ def test_a_fisheye_lens_is_named():
         covariance=np.tile(0.05**2 * np.eye(2), (inside.sum(), 1, 1)),
     )
     cameras = (CameraView('camera', 3000, 2000, 900.0),)
-    (solution, *_) = orient(replace(network, cameras=cameras, observations=observations))
-    assert any('an equidistant fisheye lens' in text for text in solution.warnings)
+    (solution,) = orient(replace(network, cameras=cameras, observations=observations))
+    assert any('an equidistant fisheye one' in text for text in solution.warnings)
+    assert solution.network.cameras[0].equidistant
+    assert solution.oriented.all() and solution.start.used.all()
+    assert solution.released[0] == ('f', 'cx', 'cy', 'k1', 'k2', 'k3', 'k4', 'affinity', 'shear')
+    found = solution.start.calibrations[0, :3] - [900, 1499.5, 999.5]
+    assert (np.abs(found) < 4 * np.sqrt(np.diag(solution.camera_covariances[0])[:3])).all()
 
 
 def test_two_photographs_are_never_a_network():
