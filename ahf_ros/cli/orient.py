@@ -80,7 +80,8 @@ def _add_camera_arguments(group: argparse._ArgumentGroup) -> None:
         action='append',
         default=[],
         metavar='CAMERA.yaml',
-        help='Calibration of a camera, as ROS (camera_info) or OpenCV write it. Repeatable.',
+        help='Calibration of a camera, as ROS (camera_info), OpenCV or Kalibr write it. '
+        'Repeatable.',
     )
     group.add_argument(
         '--adjust-calibration',
@@ -93,6 +94,12 @@ def _add_camera_arguments(group: argparse._ArgumentGroup) -> None:
         metavar='LENGTH',
         help='Start value of the focal length: 3200px, or 35mm as its equivalent on film, by the '
         'diagonal. Without it, Exif data are used, and nothing where there are none.',
+    )
+    group.add_argument(
+        '--fisheye',
+        action='store_true',
+        help='Lenses are equidistant fisheye ones, after Kannala and Brandt. Without this, they '
+        "are taken for such where Brown's model does not describe the border of the images.",
     )
     group.add_argument(
         '--cameras',
@@ -226,6 +233,7 @@ def _cameras(
         calibrations=[read_camera(path) for path in options.calibration],
         adjusted=options.adjust_calibration,
         focal_length=_in_px(options.focal_length),
+        equidistant=options.fisheye,
     )
 
 

@@ -14,13 +14,16 @@ from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
 
 from ahf_ros.interchange.files import read_text
-from ahf_ros.orientation.camera import PARAMETERS
-from ahf_ros.orientation.network import FloatArray
+from ahf_ros.orientation.camera import EQUIDISTANT, PARAMETERS, parameters_of
+from ahf_ros.orientation.network import CameraView, FloatArray
 from ahf_ros.orientation.points import correlations, standard_deviations
 from ahf_ros.text import reason_of, shown
 
 BROWN = ('', 'plumb_bob', 'rational_polynomial')
-"""Models of distortion that are read; of the last one, only without a denominator."""
+"""Names of Brown's model; the last one is read only without a denominator."""
+
+FISHEYE = ('equidistant', 'fisheye')
+"""Names of the model of Kannala and Brandt."""
 
 _MORE = (
     (slice(12, 14), 'a tilted sensor'),
@@ -32,7 +35,8 @@ _MORE = (
 _KALIBR = {'radtan': 'plumb_bob', 'none': '', 'equidistant': 'equidistant'}
 """Kalibr's models of distortion, as ROS calls them."""
 
-_COEFFICIENTS = ('k1', 'k2', 'p1', 'p2', 'k3')  # in the order of ROS and OpenCV
+_COEFFICIENTS: Sequence[str] = ('k1', 'k2', 'p1', 'p2', 'k3')  # in the order of ROS and OpenCV
+_OF_FISHEYE: Sequence[str] = ('k1', 'k2', 'k3', 'k4')
 _NAMES: Mapping[str, Sequence[str]] = {
     'width': ('image_width', 'width'),
     'height': ('image_height', 'height'),
@@ -44,13 +48,17 @@ _NAMES: Mapping[str, Sequence[str]] = {
 
 @dataclass(frozen=True)
 class CameraFile:
-    """A calibration in the order of `PARAMETERS`, and the size of its images in px."""
+    """A calibration in the order of `PARAMETERS`, and the size of its images in px.
+
+    It may be that of an `equidistant` fisheye lens.
+    """
 
     path: str
     name: str
     width: int
     height: int
     calibration: FloatArray
+    equidistant: bool = False
 
     def check(self, image: str, width: int, height: int) -> None:
         """Raise a ValueError that names both sizes if an image has another one."""
@@ -83,9 +91,15 @@ def read_camera(path: str | Path) -> CameraFile:
             'above 0'
         )
     model = content.get('distortion_model') or ''
-    if model not in BROWN:
+    if model not in (*BROWN, *FISHEYE):
         raise ValueError(
-            f"{path}: distortion_model is {shown(model)}, accepted is plumb_bob, Brown's"
+            f"{path}: distortion_model is {shown(model)}, accepted is plumb_bob, Brown's, or "
+            'equidistant, that of Kannala and Brandt'
+        )
+    if model in FISHEYE and len(distortion) not in (0, 4):
+        raise ValueError(
+            f'{path}: distortion_coefficients are {distortion}, accepted of an equidistant lens '
+            'are 4 numbers: k1, k2, k3, k4'
         )
     if len(distortion) not in (0, 4, 5, 8, 12, 14) or any(distortion[5:]):
         more = next((it for place, it in _MORE if any(distortion[place])), 'another model')
@@ -93,70 +107,68 @@ def read_camera(path: str | Path) -> CameraFile:
             f'{path}: distortion_coefficients are {distortion}, those of {more}; accepted are 4 '
             'or 5 numbers: k1, k2, p1, p2, k3'
         )
-    value = dict.fromkeys(PARAMETERS, 0.0) | {'f': fy, 'cx': cx, 'cy': cy}
-    value |= dict(zip(_COEFFICIENTS, distortion, strict=False))
+    fisheye = model in FISHEYE
+    names = EQUIDISTANT if fisheye else PARAMETERS
+    coefficients = _OF_FISHEYE if fisheye else _COEFFICIENTS
+    value = dict.fromkeys(names, 0.0) | {'f': fy, 'cx': cx, 'cy': cy}
+    value |= dict(zip(coefficients, distortion, strict=False))
     value |= {'affinity': fx / fy - 1, 'shear': shear / fy}
     name = content.get('camera_name') or Path(path).stem
-    calibration = np.array([value[it] for it in PARAMETERS])
-    return CameraFile(str(path), str(name), width, height, calibration)
+    calibration = np.array([value[it] for it in names])
+    return CameraFile(str(path), str(name), width, height, calibration, fisheye)
 
 
-def ros_yaml(
-    name: str, width: int, height: int, calibration: FloatArray, covariance: FloatArray
-) -> bytes:
+def ros_yaml(view: CameraView, calibration: FloatArray, covariance: FloatArray) -> bytes:
     """Return a calibration as ROS' camera_calibration_parsers read it.
 
     Standard deviations and correlations of the parameters follow, which those leave alone. ROS
     has no shear: it is dropped.
     """
-    matrix, _ = _opencv(calibration)
+    matrix, _ = _opencv(view, calibration)
     rows = [
-        *_rows(name, width, height, calibration, covariance, _ros_matrix),
-        'distortion_model: plumb_bob',
+        *_rows(view, calibration, covariance, _ros_matrix),
         _ros_matrix('rectification_matrix', np.eye(3)),
         _ros_matrix('projection_matrix', np.column_stack((matrix, np.zeros(3)))),
     ]
     return ('\n'.join(rows) + '\n').encode()
 
 
-def opencv_yaml(
-    name: str, width: int, height: int, calibration: FloatArray, covariance: FloatArray
-) -> bytes:
+def opencv_yaml(view: CameraView, calibration: FloatArray, covariance: FloatArray) -> bytes:
     """Return a calibration as cv2.FileStorage reads it, with the same fields as `ros_yaml`."""
-    rows = _rows(name, width, height, calibration, covariance, _opencv_matrix)
+    rows = _rows(view, calibration, covariance, _opencv_matrix)
     return ('\n'.join(('%YAML:1.0', '---', *rows)) + '\n').encode()
 
 
 def _rows(
-    name: str,
-    width: int,
-    height: int,
+    view: CameraView,
     calibration: FloatArray,
     covariance: FloatArray,
     written: Callable[[str, FloatArray], str],
 ) -> list[str]:
     """Return the fields that both formats have, matrices as one of them writes them."""
-    matrix, distortion = _opencv(calibration)
+    matrix, distortion = _opencv(view, calibration)
     return [
-        f'image_width: {width}',
-        f'image_height: {height}',
-        f'camera_name: {_quoted(name)}',
+        f'image_width: {view.width}',
+        f'image_height: {view.height}',
+        f'camera_name: {_quoted(view.name)}',
         written('camera_matrix', matrix),
+        f'distortion_model: {"equidistant" if view.equidistant else "plumb_bob"}',
         written('distortion_coefficients', distortion[None]),
-        f'parameters: [{", ".join(PARAMETERS)}]',
+        f'parameters: [{", ".join(it or "none" for it in parameters_of(view))}]',
         written('standard_deviations', standard_deviations(covariance)[None]),
         written('correlations', correlations(covariance)),
     ]
 
 
-def _opencv(calibration: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return camera matrix and distortion (5,) without the shear, which OpenCV does not have."""
-    value = dict(zip(PARAMETERS, calibration, strict=True))
+def _opencv(view: CameraView, calibration: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return camera matrix and distortion (5,) or (4,), without the shear, which OpenCV lacks."""
+    value = dict(zip(parameters_of(view), calibration, strict=True))
     f = value['f']
     matrix = np.array(
         [[f * (1 + value['affinity']), 0, value['cx']], [0, f, value['cy']], [0, 0, 1]]
     )
-    return matrix, np.array([value[it] for it in _COEFFICIENTS])
+    coefficients = _OF_FISHEYE if view.equidistant else _COEFFICIENTS
+    return matrix, np.array([value[it] for it in coefficients])
 
 
 def _listed(matrix: FloatArray) -> str:

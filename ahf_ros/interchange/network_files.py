@@ -178,7 +178,7 @@ class CameraKnowledge:
     `names` are cameras by photograph, by path or by file name; `exif` the Exif data by path, for
     photographs that are at hand, and `sizes` their width and height. `focal_length` returns a
     start value in px for a width and a height. `calibrations` are used as they are, unless they
-    are `adjusted`, too.
+    are `adjusted`, too. Without calibrations, lenses may be `equidistant`.
     """
 
     names: Mapping[str, str] = field(default_factory=dict)
@@ -187,6 +187,7 @@ class CameraKnowledge:
     calibrations: Sequence[CameraFile] = ()
     adjusted: bool = False
     focal_length: Callable[[int, int], float] | None = None
+    equidistant: bool = False
 
 
 def read_cameras(path: str | Path) -> dict[str, str]:
@@ -286,12 +287,19 @@ def _view(
                 'camera_name is that of the camera'
             )
         return CameraView(
-            name, width, height, calibration=file.calibration, fixed=not known.adjusted
+            name,
+            width,
+            height,
+            calibration=file.calibration,
+            fixed=not known.adjusted,
+            equidistant=file.equidistant,
         )
     if known.focal_length is not None:
-        return CameraView(name, width, height, known.focal_length(width, height))
-    lengths = [it.pixels for it in exif if it.pixels is not None]
-    return CameraView(name, width, height, float(np.median(lengths)) if lengths else None)
+        focal: float | None = known.focal_length(width, height)
+    else:
+        lengths = [it.pixels for it in exif if it.pixels is not None]
+        focal = float(np.median(lengths)) if lengths else None
+    return CameraView(name, width, height, focal, equidistant=known.equidistant)
 
 
 def _distinct(views: Sequence[CameraView]) -> list[CameraView]:

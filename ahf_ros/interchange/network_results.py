@@ -14,10 +14,10 @@ from typing import Any
 
 import numpy as np
 
-from ahf_ros.interchange.camera_files import opencv_yaml, ros_yaml
+from ahf_ros.interchange.camera_files import FISHEYE, opencv_yaml, ros_yaml
 from ahf_ros.interchange.files import csv_table, read_bytes, read_text, write_whole
 from ahf_ros.interchange.target_json import parsed_json
-from ahf_ros.orientation.camera import PARAMETERS
+from ahf_ros.orientation.camera import EQUIDISTANT, PARAMETERS, parameters_of
 from ahf_ros.orientation.deviations import bar_deviations, control_deviations
 from ahf_ros.orientation.network import CameraView, FloatArray, IntArray, Rejection
 from ahf_ros.orientation.points import MeasuredPoints, blocks, standard_deviations
@@ -30,8 +30,11 @@ NETWORK_FILE = 'network.json'
 POINTS_FILE = 'points.csv'
 COVARIANCE_FILE = 'covariance_of_points.npz'
 
-DISTORTION = ('k1', 'k2', 'k3', 'p1', 'p2', 'shear')
-"""Parameters of a lens in network.json; its affinity is that of fx to fy."""
+DISTORTION = (
+    ('k1', 'k2', 'k3', 'p1', 'p2', 'shear'),
+    ('k1', 'k2', 'k3', 'k4', 'shear'),
+)
+"""Parameters of lenses in network.json, Brown's and equidistant; affinity is that of fx to fy."""
 
 
 Table = list[Sequence[object]]
@@ -126,7 +129,7 @@ def _cameras(solution: Solution) -> list[dict[str, Any]]:
     cameras = []
     for index in np.flatnonzero(solution.calibrated):
         view, calibration = solution.network.cameras[index], solution.start.calibrations[index]
-        value = dict(zip(PARAMETERS, calibration.tolist(), strict=True))
+        value = dict(zip(parameters_of(view), calibration.tolist(), strict=True))
         cameras.append(
             {
                 'name': view.name,
@@ -136,7 +139,8 @@ def _cameras(solution: Solution) -> list[dict[str, Any]]:
                 'fy': value['f'],
                 'cx': value['cx'],
                 'cy': value['cy'],
-                'distortion': {name: value[name] for name in DISTORTION},
+                'distortion_model': 'equidistant' if view.equidistant else 'plumb_bob',
+                'distortion': {name: value[name] for name in DISTORTION[view.equidistant]},
                 'covariance': solution.camera_covariances[index].tolist(),
             }
         )
@@ -215,7 +219,12 @@ def read_network(folder: str | Path) -> OrientedNetwork:
         points=measured,
         rays=np.array([int(it.number('rays')) for it in points], np.int64),
         cameras=tuple(
-            CameraView(it.text('name'), int(it.number('width')), int(it.number('height')))
+            CameraView(
+                it.text('name'),
+                int(it.number('width')),
+                int(it.number('height')),
+                equidistant=_is_equidistant(it),
+            )
             for it in cameras
         ),
         calibrations=_stacked([_calibration(it) for it in cameras], (len(PARAMETERS),)),
@@ -232,15 +241,19 @@ def read_network(folder: str | Path) -> OrientedNetwork:
     )
 
 
+def _is_equidistant(camera: _Record) -> bool:
+    return camera.content.get('distortion_model') in FISHEYE
+
+
 def _calibration(camera: _Record) -> list[float]:
-    distortion = camera.record('distortion')
-    value = {name: distortion.number(name) for name in DISTORTION}
+    distortion, fisheye = camera.record('distortion'), _is_equidistant(camera)
+    value = {'': 0.0} | {name: distortion.number(name) for name in DISTORTION[fisheye]}
     value |= {name: camera.number(name) for name in ('cx', 'cy')}
     value['f'] = camera.number('fy')
     if not value['f'] > 0:
         raise ValueError(f'{camera.where}: fy is {value["f"]:g}, accepted is a number above 0')
     value['affinity'] = camera.number('fx') / value['f'] - 1
-    return [value[name] for name in PARAMETERS]
+    return [value[name] for name in (EQUIDISTANT if fisheye else PARAMETERS)]
 
 
 def _rejection(item: _Record) -> Rejection:
@@ -340,11 +353,8 @@ def calibration_files(solution: Solution) -> dict[str, bytes]:
             continue
         stem = 'camera' if len(views) == 1 else f'camera_{index + 1}'
         for suffix, write in (('ros', ros_yaml), ('opencv', opencv_yaml)):
-            files[f'{stem}_{suffix}.yaml'] = write(
-                *(view.name, view.width, view.height),
-                calibration,
-                solution.camera_covariances[index],
-            )
+            covariance = solution.camera_covariances[index]
+            files[f'{stem}_{suffix}.yaml'] = write(view, calibration, covariance)
     return files
 
 

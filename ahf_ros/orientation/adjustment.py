@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from ahf_ros.blas import one_blas_thread
 from ahf_ros.orientation import normals
-from ahf_ros.orientation.calibration import undetermined, unlike_given
-from ahf_ros.orientation.camera import PARAMETERS
+from ahf_ros.orientation.calibration import undetermined, unlike_given, unlike_pixels
+from ahf_ros.orientation.camera import PARAMETERS, parameters_of
 from ahf_ros.orientation.datum import Datum
 from ahf_ros.orientation.deviations import failed_checks, said
 from ahf_ros.orientation.knowledge import gathered, kind, knowledge
@@ -25,7 +25,6 @@ from ahf_ros.orientation.similarity import similarity_between
 from ahf_ros.orientation.solution import Solution, Start
 from ahf_ros.orientation.suspects import examined
 from ahf_ros.orientation.testing import CRITICAL, MISFIT
-from ahf_ros.orientation.zoom import zoomed
 from ahf_ros.text import counted
 
 Mask = NDArray[np.bool_]
@@ -114,6 +113,8 @@ def adjust(
     True
     """
     check_network(network)
+    if backward and any(view.equidistant for view in network.cameras):
+        raise ValueError('backward is True, accepted is False for equidistant fisheye lenses')
     try:
         with one_blas_thread():
             free = free_parameters(network, PARAMETERS if release is None else release)
@@ -159,8 +160,8 @@ class _Model:
         """Return what is known beside the photographs."""
         return knowledge(layout, gathered(self.network, layout, datum, self.lenses))
 
-    def approximate(self, state: Start) -> tuple[Start, tuple[str, ...]]:
-        """Return values after a robust adjustment, and warnings of photographs of other zooms."""
+    def approximate(self, state: Start) -> Start:
+        """Return values after a robust adjustment."""
         stage(
             'robust adjustment',
             counted(int(np.isfinite(state.positions[:, 0]).sum()), 'photograph'),
@@ -169,9 +170,8 @@ class _Model:
         state, _ = minimise(layout, state, self.known(layout), 'cauchy')
         state = replace(state, used=agreeing(self.network, state, layout))
         layout = self.lay_out(state)
-        warnings = zoomed(self.network, layout, state)
         spread = max(1.0, normals.robust_spread(normals.whitened_lengths(layout, state)))
-        return relocated(self.network, state, layout, CRITICAL * spread), warnings
+        return relocated(self.network, state, layout, CRITICAL * spread)
 
     def adjusted(self, state: Start, datum: Datum) -> Adjusted:
         """Return the adjustment in a datum."""
@@ -187,7 +187,7 @@ def _tested(model: _Model, start: Start, datum: Datum, keep_suspects: bool) -> S
     """Return the solution: of photographs alone, then with what of the rest they believe."""
     network = model.network
     alone = replace(model, network=replace(network, bars=(), control=()))
-    state, warnings = alone.approximate(start)
+    state = alone.approximate(start)
     images, critical = tested(alone.network, state, alone.lay_out, alone.known)
     stage('scale bars, control points and frame')
     unit = images.unit
@@ -207,7 +207,7 @@ def _tested(model: _Model, start: Start, datum: Datum, keep_suspects: bool) -> S
     stage('adjustment')
     result = replace(model, network=weighted).adjusted(state, datum)
     rejected, of_targets = rejections(network, result, critical / np.sqrt(factor))
-    warnings = of_known + checked.warnings + warnings + of_targets
+    warnings = of_known + checked.warnings + of_targets
     solution = _solution(checked.network, result, warnings)
     failed = failed_checks(solution, checked.suspects)
     return replace(
@@ -238,6 +238,7 @@ def _solution(network: Network, result: Adjusted, warnings: tuple[str, ...]) -> 
     normalised[every.observations] = result.lengths / np.sqrt(factor)
     warnings += undetermined(network, layout, result.state, covariance)
     warnings += unlike_given(network, result.state.calibrations)
+    warnings += unlike_pixels(network, layout, result.state, covariance)
     if unit.sigma0 > MISFIT:
         warnings += (_MISFITS.format(unit.sigma0),)
     if not result.converged:
@@ -246,6 +247,7 @@ def _solution(network: Network, result: Adjusted, warnings: tuple[str, ...]) -> 
     used[layout.observations] = True
     state = replace(
         result.state,
+        calibrations=_only(result.state.calibrations, np.unique(layout.camera)),
         used=used,
         rotations=_only(result.state.rotations, layout.photographs),
         positions=_only(result.state.positions, layout.photographs),
@@ -257,7 +259,10 @@ def _solution(network: Network, result: Adjusted, warnings: tuple[str, ...]) -> 
         residuals,
         normalised,
         _of_cameras(layout, covariance),
-        tuple(tuple(np.array(PARAMETERS)[mask].tolist()) for mask in layout.free),
+        tuple(
+            tuple(np.array(parameters_of(view))[mask].tolist())
+            for view, mask in zip(network.cameras, layout.free, strict=True)
+        ),
         poses,
         points,
         unit.sigma0,

@@ -11,12 +11,19 @@ and the image point in px, with (0, 0) at the centre of the first pixel,
 
     u = cx + f ((1 + affinity) x'' + shear y''),   v = cy + f y''.
 
+An equidistant fisheye lens [2]_, as OpenCV, ROS and Kalibr have it, has k4 in the place of p1 and
+nothing in that of p2. With r = tan t,
+
+    (x'', y'') = (x, y) t (1 + k1 t² + k2 t⁴ + k3 t⁶ + k4 t⁸) / r.
+
 That is the forward model. Backward, as DBAT, PhotoModeler and Australis have it, the same terms
 are a correction at the measured place (x_m, y_m): (x, y) = (x_m, y_m) + d(x_m, y_m).
 
 References
 ----------
 .. [1] Brown, Close-range camera calibration, Photogramm. Eng. 37 (8), 1971, 855-866.
+.. [2] Kannala & Brandt, A generic camera model and calibration method for conventional,
+   wide-angle, and fish-eye lenses, IEEE Trans. PAMI 28 (8), 2006, 1335-1340.
 """
 
 from __future__ import annotations
@@ -24,11 +31,20 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ahf_ros.orientation.network import CameraView, FloatArray
 
 PARAMETERS = ('f', 'cx', 'cy', 'k1', 'k2', 'k3', 'p1', 'p2', 'affinity', 'shear')
 
+EQUIDISTANT = ('f', 'cx', 'cy', 'k1', 'k2', 'k3', 'k4', '', 'affinity', 'shear')
+"""The same of an equidistant fisheye lens."""
+
+Fisheye = NDArray[np.bool_] | bool
+"""Whether lenses are equidistant fisheye ones: all, or one a point."""
+
+_WIDEST = 1.55  # rad off the axis that an image shows
+_ON_AXIS = 1e-8  # distance from the axis at which the limit is as good
 _INVERSIONS = 30  # steps of Newton's method; four are enough for usual lenses
 _INVERTED = 1e-12  # largest step of the last one, in focal lengths
 
@@ -53,6 +69,11 @@ def pinhole(focal_length: float, width: int, height: int) -> FloatArray:
     return calibration
 
 
+def parameters_of(view: CameraView) -> tuple[str, ...]:
+    """Return the names of the parameters of a camera; that of what it does not have is empty."""
+    return EQUIDISTANT if view.equidistant else PARAMETERS
+
+
 def known_calibration(view: CameraView) -> FloatArray:
     """Return what is given of a camera: no lens and a focal length of NaN where nothing is."""
     if view.calibration is not None:
@@ -66,23 +87,29 @@ def project(
     position: FloatArray,
     points: FloatArray,
     measured: FloatArray | None = None,
+    equidistant: Fisheye = False,
 ) -> FloatArray:
     """Return the images (n, 2) in px of points (n, 3); NaN behind the camera.
 
     Calibration, rotation and position are one or one a point. With measured image points (n, 2),
-    the distortion is the backward one at these places.
+    the distortion is the backward one at these places, which is that of no fisheye lens.
     """
     calibration = np.asarray(calibration, dtype=float)
     seen = _rotated(rotation, points - position)
     with np.errstate(divide='ignore', invalid='ignore'):
         ideal = seen[:, :2] / np.where(seen[:, 2:] > 0, seen[:, 2:], np.nan)
     if measured is None:
-        return _imaged(calibration, ideal + _distortion(calibration, ideal))
-    correction = _distortion(calibration, measured_places(calibration, measured))
+        return _imaged(calibration, ideal + _distortion(calibration, ideal, equidistant))
+    correction = _distortion(calibration, measured_places(calibration, measured), False)
     return _imaged(calibration, ideal - correction)
 
 
-def undistort(calibration: FloatArray, xy: FloatArray, backward: bool = False) -> FloatArray:
+def undistort(
+    calibration: FloatArray,
+    xy: FloatArray,
+    backward: bool = False,
+    equidistant: Fisheye = False,
+) -> FloatArray:
     """Return the places (n, 2) in the plane z = 1 whose images are xy in px, by Newton's method.
 
     A place that the distortion never reaches is NaN. Calibrations are one or one a point.
@@ -90,17 +117,21 @@ def undistort(calibration: FloatArray, xy: FloatArray, backward: bool = False) -
     calibration = np.asarray(calibration, dtype=float)
     distorted = measured_places(calibration, xy)
     if backward:
-        return distorted + _distortion(calibration, distorted)
+        return distorted + _distortion(calibration, distorted, False)
     ideal = distorted.copy()
+    if np.any(equidistant):
+        fisheye = _undistorted_fisheye(calibration, distorted)
+        ideal = np.where(np.reshape(equidistant, (-1, 1)), fisheye, distorted)
     step = np.zeros_like(ideal)
     with np.errstate(all='ignore'):
         for _ in range(_INVERSIONS):
-            gap = distorted - ideal - _distortion(calibration, ideal)
-            step = _solved(np.eye(2) + _distortion_by_place(calibration, ideal), gap)
+            gap = distorted - ideal - _distortion(calibration, ideal, equidistant)
+            slope = np.eye(2) + _distortion_by_place(calibration, ideal, equidistant)
+            step = _solved(slope, gap)
             ideal += step
             if not (np.abs(step) > _INVERTED).any():
                 break
-        return np.where((np.abs(step) <= _INVERTED).all(axis=1)[:, None], ideal, np.nan)
+        return np.where((np.abs(step) <= _INVERTED).all(axis=1, keepdims=True), ideal, np.nan)
 
 
 def measured_places(calibration: FloatArray, xy: FloatArray) -> FloatArray:
@@ -116,6 +147,7 @@ def linearise(
     position: FloatArray,
     points: FloatArray,
     measured: FloatArray | None = None,
+    equidistant: Fisheye = False,
 ) -> Linearised:
     """Return images of points with their analytic derivatives; arguments as in `project`.
 
@@ -126,12 +158,12 @@ def linearise(
     seen = _rotated(rotation, points - position)
     ideal = seen[:, :2] / seen[:, 2:]
     place, sign = (ideal, 1) if measured is None else (measured_places(calibration, measured), -1)
-    distorted = ideal + sign * _distortion(calibration, place)
-    by_place = _distortion_by_place(calibration, place)
+    distorted = ideal + sign * _distortion(calibration, place, equidistant)
+    by_place = _distortion_by_place(calibration, place, equidistant)
     sensor = _sensor(calibration)
 
     by_calibration = np.zeros((len(points), 2, len(PARAMETERS)))
-    by_calibration[:, :, 3:8] = sign * sensor @ _distortion_by_coefficient(place)
+    by_calibration[:, :, 3:8] = sign * sensor @ _distortion_by_coefficient(place, equidistant)
     outer = [0, 1, 2, 8, 9]
     by_calibration[:, :, outer] = _sensor_by_parameter(calibration, distorted)
     by_ideal = sensor
@@ -207,22 +239,63 @@ def _sensor_by_parameter(calibration: FloatArray, distorted: FloatArray) -> Floa
     return derivative
 
 
-def _distortion(calibration: FloatArray, place: FloatArray) -> FloatArray:
+def _distortion(calibration: FloatArray, place: FloatArray, equidistant: Fisheye) -> FloatArray:
     """Return the distortion (n, 2) at places (n, 2) of the plane z = 1."""
     k1, k2, k3, p1, p2 = calibration.T[3:8]
     x, y = place.T
     r2 = x**2 + y**2
     radial = r2 * (k1 + r2 * (k2 + r2 * k3))
-    return np.stack(
+    brown = np.stack(
         [
             x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x**2),
             y * radial + p1 * (r2 + 2 * y**2) + 2 * p2 * x * y,
         ],
         axis=-1,
     )
+    if not np.any(equidistant):
+        return brown
+    radius, angle, _ = _angles(place)
+    stretch = (_powers(angle) * _polynomial(calibration)).sum(axis=-1) / radius - 1
+    return np.where(np.reshape(equidistant, (-1, 1)), stretch[:, None] * place, brown)
 
 
-def _distortion_by_place(calibration: FloatArray, place: FloatArray) -> FloatArray:
+def _undistorted_fisheye(calibration: FloatArray, distorted: FloatArray) -> FloatArray:
+    """Return about where distorted places (n, 2) of fisheye lenses come from, by their angles."""
+    distance = np.maximum(np.linalg.norm(distorted, axis=1), _ON_AXIS)
+    angle = np.minimum(distance, _WIDEST)
+    for _ in range(_INVERSIONS):
+        error = (_powers(angle) * _polynomial(calibration)).sum(axis=-1) - distance
+        angle = np.clip(angle - error / _slope(calibration, angle), _ON_AXIS, _WIDEST)
+    return distorted * (np.tan(angle) / distance)[:, None]
+
+
+def _slope(calibration: FloatArray, angle: FloatArray) -> FloatArray:
+    """Return the derivatives (n,) of distances in the image of a fisheye lens by angles (n,)."""
+    odd = np.arange(1, 10, 2)
+    slopes: FloatArray = (odd * angle[:, None] ** (odd - 1) * _polynomial(calibration)).sum(-1)
+    return slopes
+
+
+def _angles(place: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return the distances (n,) of places from the axis, their angles in rad, and unit vectors."""
+    radius = np.maximum(np.linalg.norm(place, axis=1), _ON_AXIS)
+    return radius, np.arctan(radius), place / radius[:, None]
+
+
+def _powers(angle: FloatArray) -> FloatArray:
+    """Return t, t³, t⁵, t⁷ and t⁹ (n, 5) of angles (n,)."""
+    powers: FloatArray = angle[:, None] ** np.arange(1, 10, 2)
+    return powers
+
+
+def _polynomial(calibration: FloatArray) -> FloatArray:
+    """Return 1, k1, k2, k3 and k4 of equidistant lenses."""
+    return np.concatenate([np.ones_like(calibration[..., :1]), calibration[..., 3:7]], axis=-1)
+
+
+def _distortion_by_place(
+    calibration: FloatArray, place: FloatArray, equidistant: Fisheye
+) -> FloatArray:
     """Return the derivatives (n, 2, 2), which are symmetric, of the distortion by its place."""
     k1, k2, k3, p1, p2 = calibration.T[3:8]
     x, y = place.T
@@ -234,10 +307,17 @@ def _distortion_by_place(calibration: FloatArray, place: FloatArray) -> FloatArr
     derivative[:, 1, 1] = radial + 2 * y**2 * by_r2 + 6 * p1 * y + 2 * p2 * x
     mixed = 2 * x * y * by_r2 + 2 * p1 * x + 2 * p2 * y
     derivative[:, 0, 1] = derivative[:, 1, 0] = mixed
-    return derivative
+    if not np.any(equidistant):
+        return derivative
+    radius, angle, along = _angles(place)
+    across = (_powers(angle) * _polynomial(calibration)).sum(axis=-1) / radius
+    outwards = _slope(calibration, angle) / (1 + radius**2)
+    outer = along[:, :, None] * along[:, None, :]
+    fisheye = outwards[:, None, None] * outer + across[:, None, None] * (np.eye(2) - outer)
+    return np.where(np.reshape(equidistant, (-1, 1, 1)), fisheye - np.eye(2), derivative)
 
 
-def _distortion_by_coefficient(place: FloatArray) -> FloatArray:
+def _distortion_by_coefficient(place: FloatArray, equidistant: Fisheye) -> FloatArray:
     """Return the derivatives (n, 2, 5) of the distortion by k1, k2, k3, p1 and p2."""
     x, y = place.T
     r2 = x**2 + y**2
@@ -246,4 +326,9 @@ def _distortion_by_coefficient(place: FloatArray) -> FloatArray:
     derivative[:, 0, 3] = derivative[:, 1, 4] = 2 * x * y
     derivative[:, 1, 3] = r2 + 2 * y**2
     derivative[:, 0, 4] = r2 + 2 * x**2
-    return derivative
+    if not np.any(equidistant):
+        return derivative
+    _, angle, along = _angles(place)
+    fisheye = np.zeros_like(derivative)
+    fisheye[:, :, :4] = along[:, :, None] * _powers(angle)[:, None, 1:]
+    return np.where(np.reshape(equidistant, (-1, 1, 1)), fisheye, derivative)

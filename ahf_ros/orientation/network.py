@@ -84,6 +84,8 @@ class CameraView:
     """All of `camera.PARAMETERS` where a calibration is given."""
     fixed: bool = False
     """Whether the calibration is kept as it is."""
+    equidistant: bool = False
+    """Whether its lens is an equidistant fisheye one; else it is Brown's."""
 
 
 @dataclass(frozen=True)

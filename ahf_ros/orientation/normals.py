@@ -53,7 +53,8 @@ class Layout:
 
     `photographs` and `points` are the indices in the network of those that are determined;
     `photograph` and `point` (m,) index into them. `free` (cameras, parameters) marks what is
-    estimated of the calibrations. `whitening` (m, 2, 2) makes unit weights of the observations.
+    estimated of the calibrations, `equidistant` (cameras,) fisheye lenses. `whitening` (m, 2, 2)
+    makes unit weights of the observations.
     """
 
     observations: IntArray
@@ -65,6 +66,7 @@ class Layout:
     xy: FloatArray
     whitening: FloatArray
     free: NDArray[np.bool_]
+    equidistant: NDArray[np.bool_]
     backward: bool
 
     @property
@@ -141,6 +143,7 @@ def lay_out(
         observations.xy[chosen],
         np.linalg.inv(np.linalg.cholesky(observations.covariance[chosen])),
         free & seen[:, None],
+        np.array([view.equidistant for view in network.cameras]),
         backward,
     )
 
@@ -200,6 +203,7 @@ def _residuals(layout: Layout, state: Start, rows: IntArray, points: FloatArray)
         state.positions[photographs],
         points,
         layout.xy[rows] if layout.backward else None,
+        layout.equidistant[layout.camera[rows]],
     )
     return layout.xy[rows] - computed
 
@@ -232,6 +236,7 @@ def linearise(layout: Layout, state: Start) -> Design:
         state.positions[photographs],
         state.points[layout.points[layout.point]],
         layout.xy if layout.backward else None,
+        layout.equidistant[layout.camera],
     )
     whitening = layout.whitening
     return Design(

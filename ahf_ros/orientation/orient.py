@@ -13,17 +13,21 @@ from ahf_ros.blas import one_blas_thread
 from ahf_ros.orientation.adjustment import adjust
 from ahf_ros.orientation.calibration import UNDETERMINED
 from ahf_ros.orientation.datum import Datum
-from ahf_ros.orientation.lens_model import unsuitable_lenses
+from ahf_ros.orientation.lens_model import (
+    fisheye_lenses,
+    unsuitable_lenses,
+    with_fisheye_lenses,
+)
 from ahf_ros.orientation.network import FloatArray, IntArray, Network, once_a_photograph
 from ahf_ros.orientation.planar import principal_axes
 from ahf_ros.orientation.progress import Watcher, watched
-from ahf_ros.orientation.resection import FEWEST_POINTS
+from ahf_ros.orientation.resection import FEWEST_POINTS, at_one_place
 from ahf_ros.orientation.similarity import in_principal_axes
 from ahf_ros.orientation.solution import Solution, Start
 from ahf_ros.orientation.start import FEWEST_PHOTOGRAPHS, oriented, reversal, starts
 from ahf_ros.orientation.triples import FEWEST_COMMON, known_calibrations
 from ahf_ros.orientation.views import views_of
-from ahf_ros.orientation.zoom import OWN_CAMERA, zoom_of, zooms_of_groups
+from ahf_ros.orientation.zoom import of_other_zooms, with_common_zooms, zooms_of_groups
 from ahf_ros.text import counted, listed
 
 LINE = 0.01
@@ -34,6 +38,9 @@ CONTRADICTING = 0.6
 
 Those of its targets in photographs that could not be oriented disagree.
 """
+
+WORSE = 1.1
+"""Ratio of sigma0 from which on cameras of about one focal length are not one."""
 
 NAMED = 8
 """Photographs or targets that a message names."""
@@ -114,13 +121,23 @@ def _oriented(network: Network, adjusted: Callable[[Network, Start], Solution]) 
     _check(network)
     refused: list[str] = []
     solutions: list[Solution] = []
-    for start in map(in_principal_axes, starts(network)):
-        reason = _ambiguous(network, start)
+    for divided, start in starts(network):
+        start = in_principal_axes(start)
+        reason = _ambiguous(divided, start)
         if reason is None:
-            solution = adjusted(network, start)
+            solution = adjusted(divided, start)
+            if len(divided.cameras) > len(network.cameras):
+                common = adjusted(*with_common_zooms(network, solution))
+                solution = common if common.sigma0 < WORSE * solution.sigma0 else solution
+            if (fisheye := with_fisheye_lenses(solution)) is not None:
+                other = adjusted(*fisheye)
+                solution = (
+                    other if other.start.used.sum() > solution.start.used.sum() else solution
+                )
             reason = _doubtful(solution)
         if reason is None:
             warnings = solution.warnings + unsuitable_lenses(solution)
+            warnings += of_other_zooms(network, solution) + fisheye_lenses(network, solution)
             solutions.append(replace(solution, warnings=warnings))
         else:
             refused.append(reason)
@@ -130,7 +147,8 @@ def _oriented(network: Network, adjusted: Callable[[Network, Start], Solution]) 
     first = solutions[0]
     return [
         replace(
-            first, warnings=first.warnings + tuple(refused) + left + zooms_of_groups(solutions)
+            first,
+            warnings=first.warnings + tuple(refused) + left + zooms_of_groups(network, solutions),
         ),
         *solutions[1:],
     ]
@@ -218,7 +236,8 @@ def _doubtful(solution: Solution) -> str | None:
             f'{FEWEST_PHOTOGRAPHS} or more. Take more from other directions'
         )
     known = known_calibrations(network)[:, 0]
-    for camera in np.unique(network.camera_of[photographs]):
+    cameras, taken = np.unique(network.camera_of[photographs], return_counts=True)
+    for camera in cameras[taken >= min(FEWEST_PHOTOGRAPHS, taken.max())]:
         sigma = np.sqrt(solution.camera_covariances[camera][0, 0])
         focal = start.calibrations[camera, 0]
         if not np.isfinite(known[camera]) and not 0 < sigma < UNDETERMINED * focal:
@@ -240,21 +259,21 @@ def _doubtful(solution: Solution) -> str | None:
 
 
 def _left_out(network: Network, solutions: Sequence[Solution]) -> tuple[str, ...]:
-    """Return warnings of photographs that are in no solution, and of their zoom."""
+    """Return warnings of photographs that are in no solution."""
     posed = np.zeros(len(network.photographs), dtype=bool)
     placed = np.zeros(len(network.targets), dtype=bool)
     for solution in solutions:
         posed[oriented(solution.start)] = True
         placed |= np.isfinite(solution.start.points[:, 0])
     views = views_of(network)
-    few, alike, zoomed = [], [], []
+    few, narrow, alike = [], [], []
     start = solutions[0].start
     for index in np.flatnonzero(~posed).tolist():
         seen = np.isfinite(start.points[views[index].points, 0])
         if seen.sum() < FEWEST_POINTS:
             few.append(index)
-        elif (factor := zoom_of(network, views[index], start)) is not None:
-            zoomed.append((index, factor))
+        elif at_one_place(views[index].xy[seen], views[index].sigma[seen]):
+            narrow.append(index)
         else:
             alike.append(index)
     warnings = []
@@ -263,15 +282,15 @@ def _left_out(network: Network, solutions: Sequence[Solution]) -> tuple[str, ...
             f'{_names(network.photographs, few)}: not oriented, fewer than {FEWEST_POINTS} '
             'targets with coordinates. Take photographs between them and the others'
         )
+    if narrow:
+        warnings.append(
+            f'{_names(network.photographs, narrow)}: not oriented, all targets are at one place '
+            'in the image. Check the identification'
+        )
     if alike:
         warnings.append(
             f'{_names(network.photographs, alike)}: not oriented, no pose fits well or two fit '
             'alike. Check their IDs, and take others that are tilted or from nearer'
-        )
-    for index, factor in zoomed:
-        warnings.append(
-            f'{network.photographs[index]}: not oriented, its focal length is about {factor:.2f} '
-            f'times that of camera {network.cameras[views[index].camera].name}. {OWN_CAMERA}'
         )
     seen = np.bincount(network.observations.point, minlength=len(network.targets)) > 0
     if lost := np.flatnonzero(~placed & seen).tolist():

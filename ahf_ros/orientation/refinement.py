@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ahf_ros.orientation import normals
 from ahf_ros.orientation.calibration import usual
-from ahf_ros.orientation.camera import PARAMETERS
+from ahf_ros.orientation.camera import PARAMETERS, parameters_of
 from ahf_ros.orientation.datum import movements
 from ahf_ros.orientation.least_squares import Conditions, Knowledge, minimise
 from ahf_ros.orientation.network import Network
@@ -56,7 +56,9 @@ def free_parameters(network: Network, names: tuple[str, ...]) -> NDArray[np.bool
     if unknown:
         raise ValueError(f'free: {sorted(unknown)} is no parameter, expected {list(PARAMETERS)}')
     mask = np.array([name in names for name in PARAMETERS])
-    return np.array([mask & (not view.fixed) for view in network.cameras])
+    exists = [[name != '' for name in parameters_of(view)] for view in network.cameras]
+    fixed = np.array([view.fixed for view in network.cameras])
+    return mask & np.array(exists) & ~fixed[:, None]
 
 
 def agreeing(network: Network, state: Start, adjusted: Layout) -> NDArray[np.bool_]:

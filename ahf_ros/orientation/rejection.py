@@ -102,7 +102,9 @@ def _rays(layout: Layout, state: Start, rows: NDArray[np.int64]) -> tuple[FloatA
     """Return the centres (n, 3) and directions (n, 3) of the rays of rows of a layout."""
     photographs = layout.photographs[layout.photograph[rows]]
     calibrations = state.calibrations[layout.camera[rows]]
-    ideal = camera.undistort(calibrations, layout.xy[rows], layout.backward)
+    ideal = camera.undistort(
+        calibrations, layout.xy[rows], layout.backward, layout.equidistant[layout.camera[rows]]
+    )
     towards = directions(state.rotations[photographs], np.nan_to_num(ideal))
     return state.positions[photographs], towards
 

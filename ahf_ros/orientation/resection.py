@@ -28,6 +28,9 @@ ROUNDS = 15
 BOUND = 4.0
 """Standard deviations beyond which a point does not agree."""
 
+EXTENT = 20.0
+"""Standard deviations over which image points must spread: others say nothing of the distance."""
+
 ALIKE = 2.0
 """Chi-squares that differ by less do not decide between two poses."""
 
@@ -49,6 +52,11 @@ class Resection:
     scale: float
 
 
+def at_one_place(xy: FloatArray, sigma: FloatArray) -> bool:
+    """Return whether image points (n, 2) are too near to each other to determine a pose."""
+    return bool(np.linalg.norm(xy.std(axis=0)) < EXTENT * np.median(sigma))
+
+
 def resections(points: FloatArray, xy: FloatArray, sigma: FloatArray) -> list[Resection]:
     """Return the poses from which `points` (n, 3) are seen at normalised `xy` (n, 2), best first.
 
@@ -56,7 +64,7 @@ def resections(points: FloatArray, xy: FloatArray, sigma: FloatArray) -> list[Re
     was found. Chi-squares are in units of the best pose's scale, so that a lens that is not known
     yet does not decide.
     """
-    if len(points) < FEWEST_POINTS:
+    if len(points) < FEWEST_POINTS or at_one_place(xy, sigma):
         return []
     planar = planar_poses(points, xy) if is_flat(points) else []
     candidates = [*_sampled(points, xy), *planar]

@@ -65,6 +65,7 @@ def resect(
     calibration: ArrayLike,
     *,
     sigma: float = 0.1,
+    equidistant: bool = False,
 ) -> Pose:
     """Return the pose of the camera of one image among targets of known coordinates.
 
@@ -80,9 +81,11 @@ def resect(
         Coordinates with their covariance, as `read_network` and `orient` have them. They are named
         `family:ID` or by their IDs.
     calibration : array_like of float, shape (10,)
-        Camera in the order of `ahf_ros.orientation.camera.PARAMETERS`.
+        Camera in the order of `ahf_ros.orientation.camera.PARAMETERS`, or of `EQUIDISTANT`.
     sigma : float
         Standard deviation of the centres that have no covariance, px.
+    equidistant : bool
+        Whether the lens is an equidistant fisheye one, as `OrientedNetwork.cameras` say.
 
     Returns
     -------
@@ -127,10 +130,11 @@ def resect(
         )
     names, chosen, aside = known_targets(targets, points.names)
     xy = np.array([(it.x, it.y) for it in chosen], float).reshape(-1, 2)
-    places = undistort(lens, xy)
-    by_place = linearise(
-        lens, np.eye(3), np.zeros(3), np.column_stack((places, np.ones(len(places))))
-    ).by_point[:, :, :2]
+    places = undistort(lens, xy, equidistant=equidistant)
+    ahead = np.column_stack((places, np.ones(len(places))))
+    by_place = linearise(lens, np.eye(3), np.zeros(3), ahead, equidistant=equidistant).by_point[
+        :, :, :2
+    ]
     by_pixel = np.linalg.inv(np.where(np.isfinite(by_place), by_place, np.eye(2)))
     covariances = by_pixel @ centre_covariances(chosen, sigma) @ by_pixel.transpose(0, 2, 1)
     return pose_of(NamedPlaces(names, places, covariances, aside), points)

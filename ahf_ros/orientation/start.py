@@ -13,7 +13,7 @@ from itertools import islice
 
 import numpy as np
 
-from ahf_ros.orientation.camera import pinhole
+from ahf_ros.orientation.camera import known_calibration
 from ahf_ros.orientation.network import FloatArray, IntArray, Network
 from ahf_ros.orientation.planar import mirrored
 from ahf_ros.orientation.progress import stage
@@ -22,17 +22,19 @@ from ahf_ros.orientation.resection import ALIKE, BOUND, FEWEST_POINTS, Resection
 from ahf_ros.orientation.solution import Start
 from ahf_ros.orientation.triangulation import intersect
 from ahf_ros.orientation.triples import (
-    STEPS,
     WEAK,
-    Seed,
     focal_sigma,
     known_calibrations,
     seeds,
     with_lens,
 )
 from ahf_ros.orientation.views import View, lengths_of, spread_of, views_of
+from ahf_ros.orientation.zoom import with_own_focal, with_own_zooms
 
 MOST_SEEDS = 5
+
+MOST_DIVISIONS = 3
+"""Times that photographs of other zooms get cameras of their own."""
 
 GROWING = 5
 """Known points of a photograph that is added while points and lenses are still uncertain."""
@@ -51,22 +53,24 @@ ONE_MINIMUM = np.radians(0.5)
 """Networks most of whose photographs are turned against each other by less are the same."""
 
 
-def starts(network: Network) -> list[Start]:
+def starts(network: Network) -> list[tuple[Network, Start]]:
     """Return approximate values of each connected group of photographs, the largest first.
 
-    Groups without approximate values are left out. The same network gives the same values, bit for
-    bit: what is sampled at random is sampled with fixed seeds.
+    Photographs of another zoom have cameras of their own in its network. Groups without
+    approximate values are left out. The same network gives the same values, bit for bit: what is
+    sampled at random is sampled with fixed seeds.
     """
     views = views_of(network)
     remaining = [index for index, view in enumerate(views) if len(view.points) >= FEWEST_POINTS]
-    found: list[Start] = []
+    found: list[tuple[Network, Start]] = []
     while len(remaining) >= FEWEST_PHOTOGRAPHS:
         stage('start values', f'a beginning among {len(remaining)} photographs')
-        start = _largest(network, views, remaining)
-        if start is None:
+        largest = _largest(network, views, remaining)
+        if largest is None:
             break
-        other, excess = reversal(network, start)
-        found.append(other if excess < 0 else start)
+        divided, start = largest
+        other, excess = reversal(divided, start)
+        found.append((divided, other if excess < 0 else start))
         remaining = [index for index in remaining if np.isnan(start.positions[index, 0])]
     return found
 
@@ -99,35 +103,51 @@ def reversal(network: Network, start: Start) -> tuple[Start, float]:
     return other, costs[1] - costs[0]
 
 
-def _largest(network: Network, views: Sequence[View], among: Sequence[int]) -> Start | None:
+def _largest(
+    network: Network, views: Sequence[View], among: Sequence[int]
+) -> tuple[Network, Start] | None:
     """Return what grows largest of the best seeds, of several equally large ones the best.
 
-    Where a second seed agrees about as many photographs, others are not tried.
+    Where a second seed agrees about as many photographs, or one with zooms, others are not tried.
     """
     best: tuple[float, float] | None = None
-    result: Start | None = None
+    result: tuple[Network, Start] | None = None
     for seed in islice(seeds(network, views, among), MOST_SEEDS):
-        start = _grown(network, views, seed, among)
-        if start is None or len(oriented(start)) < FEWEST_PHOTOGRAPHS:
+        grown = _with_zooms(network, views, seed.start, among)
+        if grown is None or len(oriented(grown[1])) < FEWEST_PHOTOGRAPHS:
             continue
-        lengths = lengths_of(network, start)
+        lengths, start = lengths_of(*grown), grown[1]
         number = len(oriented(start))
         rating = (-number, spread_of(lengths) / max(float(np.mean(start.used)), 1e-9))
         known = ~np.isnan(lengths)
         agrees = np.mean(start.used[known]) > AGREES
         again = best is not None and -best[0] == number
         if best is None or rating < best:
-            best, result = rating, start
-        if agrees and (again or number == len(among)):
+            best, result = rating, grown
+        divided = len(grown[0].cameras) > len(network.cameras)
+        if agrees and (again or divided or number == len(among)):
             break
     return result
 
 
+def _with_zooms(
+    network: Network, views: Sequence[View], start: Start, among: Sequence[int]
+) -> tuple[Network, Start] | None:
+    """Return what a seed reaches, in a network whose other zooms have cameras of their own."""
+    grown = _grown(network, views, start, among)
+    for _ in range(MOST_DIVISIONS):
+        divided = with_own_zooms(network, views, grown, among) if grown is not None else None
+        if divided is None:
+            break
+        network, views = divided[0], views_of(divided[0])
+        grown = _grown(network, views, divided[1], among)
+    return (network, grown) if grown is not None else None
+
+
 def _grown(
-    network: Network, views: Sequence[View], seed: Seed, among: Sequence[int]
+    network: Network, views: Sequence[View], start: Start, among: Sequence[int]
 ) -> Start | None:
     """Return the values of all photographs and points that a seed reaches."""
-    start = seed.start
     postponed: dict[int, int] = {}
     fewest = GROWING
     try:
@@ -208,34 +228,20 @@ def _pose(
 ) -> tuple[Resection | None, FloatArray]:
     """Return the pose of a photograph and its calibration; None while it is not certain.
 
-    Where nothing is known of its camera, focal lengths are scanned.
+    Where nothing is known of its camera, its focal length is searched.
     """
     calibration = start.calibrations[view.camera]
     seen = np.isfinite(start.points[view.points, 0])
-    if np.isfinite(calibration[0]):
-        poses = _poses(view, start, seen, calibration, spread)
+    taken = np.isfinite(start.positions[network.camera_of == view.camera, 0])
+    if taken.any() or np.isfinite(known_calibration(network.cameras[view.camera])[0]):
+        xy, sigma = view.normalised(start.calibrations)
+        poses = resections(start.points[view.points[seen]], xy[seen], sigma[seen] * spread)
     else:
-        camera = network.cameras[view.camera]
-        width = max(camera.width, camera.height)
-        tried = [pinhole(step * width, camera.width, camera.height) for step in STEPS]
-        each = [(_poses(view, start, seen, one, spread), one) for one in tried]
-        able = [(poses, one) for poses, one in each if poses]
-        if not able:
-            return None, calibration
-        poses, calibration = min(able, key=lambda pair: pair[0][0].scale * pair[1][0])
+        poses, calibration = with_own_focal(network, view, start, spread)
     if not poses or poses[0].agrees.sum() < max(fewest, seen.sum() / 2):
         return None, calibration
     doubtful = len(poses) > 1 and poses[1].chi_square < poses[0].chi_square + ALIKE
     return (None if doubtful else poses[0]), calibration
-
-
-def _poses(
-    view: View, start: Start, seen: FloatArray, calibration: FloatArray, spread: float
-) -> list[Resection]:
-    calibrations = start.calibrations.copy()
-    calibrations[view.camera] = calibration
-    xy, sigma = view.normalised(calibrations)
-    return resections(start.points[view.points[seen]], xy[seen], sigma[seen] * spread)
 
 
 def _with_pose(

@@ -8,7 +8,9 @@ what is known, their covariance C from both, and A as their change under a simil
 tests the rows i of one bar or point against all others, and P_ii^+ v_i is what it differs from
 them [1]_. The worst goes first. Where leaving out another one explains nearly as much, as always
 of two, nobody can tell which is wrong: then both get the variance at which they agree, as do all
-where no few are to blame [2]_, and deviations are tested against that of the rest [3]_.
+where no few are to blame [2]_, and deviations are tested against that of the rest [3]_. Of so few
+that leaving out any leaves no redundancy to test another, that is said beforehand: an error e of
+one looks like one of j where e' P e is small without j, as may be of four control points.
 
 References
 ----------
@@ -21,7 +23,6 @@ References
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -97,7 +98,7 @@ class _Tested:
 
 
 @dataclass(frozen=True)
-class _Misclosures:
+class Misclosures:
     """Known minus measured: `gaps` (r,), their change under similarities, and both covariances."""
 
     names: tuple[str, ...]
@@ -108,7 +109,7 @@ class _Misclosures:
     measured: FloatArray
 
     @classmethod
-    def of(cls, known: Known, points: FloatArray, covariance: FloatArray) -> _Misclosures:
+    def of(cls, known: Known, points: FloatArray, covariance: FloatArray) -> Misclosures:
         """Return what bars and control points have over measured points."""
         parts = of_bars(known, points), of_control(known, points)
         rows, gaps, given = (np.concatenate(column) for column in zip(*parts, strict=True))
@@ -191,14 +192,13 @@ def examined(
     witnesses where those that are used contradict each other. Suspects are kept where `keep` says
     so.
     """
-    closures = _Misclosures.of(known, points, covariance)
+    closures = Misclosures.of(known, points, covariance)
     told = np.array([it.check for it in known.bars] + [it.check for it in known.control], bool)
     used = np.flatnonzero(~told)
     if not len(used):
         return Examined(network, (), ())
     if not closures.tested(used).redundancy:
-        names = [closures.names[it] for it in used]
-        return Examined(network, (), () if told.any() else _unchecked(names))
+        return Examined(network, (), () if told.any() else (_unchecked(closures, used),))
     found = _found(closures, used)
     if any(it.rivals for it in found.suspects) and told.any():
         heard = _found(closures, np.arange(len(told)))
@@ -206,6 +206,8 @@ def examined(
         if all(it.name in ours and not it.rivals for it in heard.suspects):
             found = heard
     warnings = _words(network, closures, found, keep)
+    if not (found.suspects or told.any()):
+        warnings += _inseparable(closures, used)
     if keep:
         kept = tuple(
             replace(it, verdict='kept') if it.verdict == 'left out' else it
@@ -215,7 +217,7 @@ def examined(
     return Examined(_believed(network, closures, found), tuple(found.suspects), warnings)
 
 
-def _found(closures: _Misclosures, among: IntArray) -> _Findings:
+def _found(closures: Misclosures, among: IntArray) -> _Findings:
     """Return who is to blame among groups: few, those whose precision nobody gave, or all.
 
     All are where even a larger variance makes too many of them suspects, or none.
@@ -231,7 +233,7 @@ def _found(closures: _Misclosures, among: IntArray) -> _Findings:
     return found if found and found.suspects else _all_to_blame(closures, among)
 
 
-def _all_to_blame(closures: _Misclosures, among: IntArray) -> _Findings:
+def _all_to_blame(closures: Misclosures, among: IntArray) -> _Findings:
     """Return that groups contradict each other, and none more than others."""
     test = closures.tested(among)
     worst = int(np.argmax(test.gains))
@@ -246,7 +248,7 @@ def _all_to_blame(closures: _Misclosures, among: IntArray) -> _Findings:
     return _Findings(among, [suspect], among, closures.agreeing(among, among))
 
 
-def _search(closures: _Misclosures, among: IntArray, common: IntArray) -> _Findings | None:
+def _search(closures: Misclosures, among: IntArray, common: IntArray) -> _Findings | None:
     """Return the suspects, the worst first, None where half of what is known would be.
 
     Groups in `common` have a variance beside the given one, at which all agree.
@@ -278,7 +280,7 @@ def _search(closures: _Misclosures, among: IntArray, common: IntArray) -> _Findi
     return None
 
 
-def _believed(network: Network, closures: _Misclosures, found: _Findings) -> Network:
+def _believed(network: Network, closures: Misclosures, found: _Findings) -> Network:
     """Return the network whose suspects are checks, and whose blamed ones have their variance."""
     left_out = {it.name for it in found.suspects if it.verdict == 'left out'}
     blamed = {closures.names[it] for it in found.blamed}
@@ -298,7 +300,7 @@ def _believed(network: Network, closures: _Misclosures, found: _Findings) -> Net
 
 
 def _words(
-    network: Network, closures: _Misclosures, found: _Findings, keep: bool
+    network: Network, closures: Misclosures, found: _Findings, keep: bool
 ) -> tuple[str, ...]:
     """Return what was found in words."""
     unit = network.unit
@@ -327,9 +329,21 @@ def _words(
     return tuple(warnings)
 
 
-def _unchecked(names: Sequence[str]) -> tuple[str, ...]:
+def _unchecked(closures: Misclosures, used: IntArray) -> str:
     """Return that nothing checks what is known."""
+    names = [closures.names[it] for it in used]
     them, are = ('it', 'is') if len(names) == 1 else ('them', 'are')
     return (
-        f'{", ".join(names)} {are} believed: nothing checks {them}. Give another one, or a check',
+        f'{", ".join(names)} {are} believed: nothing checks {them}. Give another one, or a check'
+    )
+
+
+def _inseparable(closures: Misclosures, used: IntArray) -> tuple[str, ...]:
+    """Return that an error of one may look like one of another, if so few are known."""
+    test = closures.tested(used)
+    if test.redundancy >= 2 * test.freedom.max():
+        return ()
+    return (
+        f'{", ".join(closures.names[it] for it in used)} agree, but are too few to tell which one '
+        'is wrong if one is. Three scale bars or five control points do, or a check',
     )

@@ -14,7 +14,7 @@ import numpy as np
 from ahf_ros.orientation import normals
 from ahf_ros.orientation.camera import known_calibration, pinhole
 from ahf_ros.orientation.least_squares import normal_equations
-from ahf_ros.orientation.network import FloatArray, IntArray, Network, part_of
+from ahf_ros.orientation.network import CameraView, FloatArray, IntArray, Network, part_of
 from ahf_ros.orientation.normals import BEHIND
 from ahf_ros.orientation.planar import mirrored
 from ahf_ros.orientation.precision import precision
@@ -27,6 +27,9 @@ from ahf_ros.orientation.views import View, largest_angles, lengths_of, spread_o
 
 STEPS = np.geomspace(0.5, 4.0, 14)
 """Focal lengths that are tried where none is known, in widths of the image: 17 % apart."""
+
+FISHEYE = 0.4
+"""Those of fisheye lenses over those of others."""
 
 FEWEST_COMMON = 6
 MOST_PHOTOGRAPHS = 40
@@ -47,6 +50,12 @@ WEAK = 0.2
 
 BOUND = 4.0
 """Standard deviations to which a residual counts."""
+
+
+def focal_steps(view: CameraView) -> FloatArray:
+    """Return focal lengths in px that are tried of a camera of which nothing is known."""
+    steps: FloatArray = STEPS * max(view.width, view.height) * (FISHEYE if view.equidistant else 1)
+    return steps
 
 
 @dataclass(frozen=True)
@@ -221,11 +230,9 @@ def _scanned(
     """Return the best hypotheses at the local minima over the focal length."""
     view = part.cameras[camera]
     steps: list[_Hypothesis | None] = []
-    for step in STEPS:
+    for focal in focal_steps(view):
         calibrations = known.copy()
-        calibrations[camera] = pinhole(
-            step * max(view.width, view.height), view.width, view.height
-        )
+        calibrations[camera] = pinhole(focal, view.width, view.height)
         steps.append(
             min(_hypotheses(part, own, calibrations), key=lambda one: one.score, default=None)
         )
@@ -286,8 +293,8 @@ def _refined(
     except (ValueError, np.linalg.LinAlgError):
         return None
     focal = start.calibrations[unknown, 0]
-    widths = np.array([max(part.cameras[one].width, part.cameras[one].height) for one in unknown])
-    if np.any(focal < 0.3 * widths) or np.any(focal > 8 * widths):
+    steps = np.array([focal_steps(part.cameras[one])[[0, -1]] for one in unknown]).reshape(-1, 2)
+    if np.any(focal < 0.6 * steps[:, 0]) or np.any(focal > 2 * steps[:, 1]):
         return None
     lengths = lengths_of(part, start)
     spread = spread_of(lengths)

@@ -19,7 +19,6 @@ from typing import Literal
 import numpy as np
 
 from ahf_ros.orientation.calibration import usual_deviations
-from ahf_ros.orientation.camera import PARAMETERS
 from ahf_ros.orientation.deviations import bar_deviations, control_deviations, with_unit
 from ahf_ros.orientation.points import standard_deviations
 from ahf_ros.orientation.solution import Solution
@@ -117,10 +116,10 @@ def undetermined_parameters(solution: Solution, camera: int) -> list[str]:
     """Return parameters of a camera that photographs hardly determine: as usual of lenses."""
     sigmas = standard_deviations(solution.camera_covariances[camera])
     focal = solution.start.calibrations[camera, 0]
-    usual = usual_deviations(solution.network.cameras[camera], focal).values()
+    usual = usual_deviations(solution.network.cameras[camera], focal).items()
     return [
         name
-        for name, sigma, before in zip(PARAMETERS, sigmas, usual, strict=True)
+        for (name, before), sigma in zip(usual, sigmas, strict=True)
         if name in solution.released[camera] and sigma > _AS_USUAL * before
     ]
 

@@ -29,6 +29,7 @@ class View:
     xy: FloatArray
     sigma: FloatArray
     rows: IntArray
+    equidistant: bool = False
 
     def normalised(self, calibrations: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return places (n, 2) in the plane z = 1, and their standard deviations (n,).
@@ -36,7 +37,8 @@ class View:
         Where the lens has no place, that is one that agrees with nothing.
         """
         calibration = calibrations[self.camera]
-        places = np.nan_to_num(undistort(calibration, self.xy), nan=NOWHERE)
+        places = undistort(calibration, self.xy, equidistant=self.equidistant)
+        places = np.nan_to_num(places, nan=NOWHERE)
         return places, self.sigma / calibration[0]
 
 
@@ -49,7 +51,8 @@ def views_of(network: Network) -> list[View]:
         rows = np.flatnonzero(observed.photograph == photograph)
         points, first = np.unique(observed.point[rows], return_index=True)
         rows = rows[first]
-        made.append(View(int(camera), points, observed.xy[rows], sigma[rows], rows))
+        fisheye = network.cameras[camera].equidistant
+        made.append(View(int(camera), points, observed.xy[rows], sigma[rows], rows, fisheye))
     return made
 
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ahf_ros.interchange.files import write_whole
-from ahf_ros.orientation.camera import PARAMETERS
+from ahf_ros.orientation.camera import parameters_of
 from ahf_ros.orientation.points import correlations, standard_deviations
 from ahf_ros.orientation.solution import Solution
 from ahf_ros.orientation.strength import FEW_RAYS, SMALL_ANGLE, rays_of, semi_axes
@@ -126,9 +126,10 @@ def _cameras(solution: Solution, enlarged: float) -> list[dict[str, Any]]:
     for index in np.flatnonzero(solution.calibrated).tolist():
         view = solution.network.cameras[index]
         correlation = correlations(solution.camera_covariances[index])
-        free = [PARAMETERS.index(name) for name in solution.released[index]]
+        names = parameters_of(view)
+        free = [names.index(name) for name in solution.released[index]]
         correlated = [
-            (PARAMETERS[first], PARAMETERS[second], correlation[first, second])
+            (names[first], names[second], correlation[first, second])
             for place, first in enumerate(free)
             for second in free[:place]
             if abs(correlation[first, second]) > _CORRELATED

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ahf_ros.interchange.network_results import rejections
-from ahf_ros.orientation.camera import PARAMETERS
+from ahf_ros.orientation.camera import parameters_of
 from ahf_ros.orientation.deviations import bar_deviations, control_deviations
 from ahf_ros.orientation.points import standard_deviations
 from ahf_ros.orientation.solution import Solution
@@ -80,7 +80,8 @@ def unknown_rows(solution: Solution) -> list[str]:
     for camera in np.flatnonzero(solution.calibrated).tolist():
         name = f'Camera {solution.network.cameras[camera].name}'
         released = solution.released[camera]
-        if kept := [it for it in PARAMETERS if it not in released]:
+        names = parameters_of(solution.network.cameras[camera])
+        if kept := [it for it in names if it and it not in released]:
             rows.append(f'{name}: {", ".join(kept)} kept as given, or left out where they are 0.')
         if unknown := undetermined_parameters(solution, camera):
             rows.append(
@@ -101,7 +102,10 @@ def camera_rows(solution: Solution, camera: int) -> Rows:
     sigmas = standard_deviations(solution.camera_covariances[camera])
     values = solution.start.calibrations[camera]
     unknown = undetermined_parameters(solution, camera)
-    for name, value, sigma in zip(PARAMETERS, values, sigmas, strict=True):
+    names = parameters_of(solution.network.cameras[camera])
+    for name, value, sigma in zip(names, values, sigmas, strict=True):
+        if not name:
+            continue
         called = f'{name}, px' if name in _IN_PX else name
         if name in solution.released[camera]:
             digits = decimals([sigma])

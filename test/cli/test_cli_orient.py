@@ -19,6 +19,7 @@ from ruamel.yaml import YAML
 from ahf_ros.interchange.camera_files import ros_yaml
 from ahf_ros.interchange.network_results import read_network
 from ahf_ros.interchange.robot_files import read_robot_poses
+from ahf_ros.orientation.network import CameraView
 from ahf_ros.orientation.transform import Transform
 from support import ROOT, environment
 from support.command_line import status
@@ -37,7 +38,7 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
     lines = [json.dumps(it) for it in records(TRUE.network)]
     lines.append(json.dumps(json.loads(lines[0]) | {'image': 'empty.jpg', 'targets': []}))
     (folder / 'results.jsonl').write_text('\n'.join(lines))
-    camera = ros_yaml('camera', *SIZE, CALIBRATION, np.zeros((10, 10)))
+    camera = ros_yaml(CameraView('camera', *SIZE), CALIBRATION, np.zeros((10, 10)))
     (folder / 'camera.yaml').write_bytes(camera)
     points = TRUE.start.points
     with (folder / 'bars.csv').open('w', newline='') as file:
@@ -180,7 +181,7 @@ def test_files_that_cannot_be_used(
     """Each of them is named, nothing is written, and the exit status is 1."""
     (tmp_path / 'empty.jsonl').touch()
     (tmp_path / 'other.yaml').write_bytes(
-        ros_yaml('camera', 800, 600, CALIBRATION, np.zeros((10, 10)))
+        ros_yaml(CameraView('camera', 800, 600), CALIBRATION, np.zeros((10, 10)))
     )
     (tmp_path / 'bars.csv').write_text('id_1,id_2,length,sigma\n98,99,5,1\n')
     (tmp_path / 'two.jsonl').write_text('\n'.join(results.read_text().splitlines()[:1]))

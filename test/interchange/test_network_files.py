@@ -19,7 +19,7 @@ from ahf_ros.interchange.exif import Exif, read_exif
 from ahf_ros.interchange.network_files import CameraKnowledge, make_network, read_cameras
 from ahf_ros.interchange.observation_files import ObservedPhotograph, read_observations
 from ahf_ros.interchange.target_json import to_json
-from ahf_ros.orientation.network import Network
+from ahf_ros.orientation.network import CameraView, Network
 from ahf_ros.target import Identification, Target
 from support.networks import CALIBRATION
 
@@ -225,7 +225,7 @@ def test_a_table_tells_cameras_apart(results: Path, tmp_path: Path) -> None:
 @pytest.mark.parametrize('write', [ros_yaml, opencv_yaml])
 def test_a_calibration_is_used_as_it_is(results: Path, tmp_path: Path, write: Any) -> None:
     path = tmp_path / 'camera.yaml'
-    path.write_bytes(write('left "1"', 1600, 1200, CALIBRATION, np.eye(10)))
+    path.write_bytes(write(CameraView('left "1"', 1600, 1200), CALIBRATION, np.eye(10)))
     file = read_camera(path)
     assert (file.name, file.width, file.height) == ('left "1"', 1600, 1200)
     np.testing.assert_allclose(file.calibration[:9], CALIBRATION[:9], rtol=1e-6, atol=1e-12)
@@ -241,12 +241,24 @@ def test_a_calibration_is_used_as_it_is(results: Path, tmp_path: Path, write: An
         sized_network(results, known, (1200, 1600))
 
 
+@pytest.mark.parametrize('write', [ros_yaml, opencv_yaml])
+def test_a_fisheye_calibration_is_read_as_it_was_written(tmp_path: Path, write: Any) -> None:
+    calibration = np.array([700, 803, 596, 0.05, 0.01, -0.004, 0.0005, 0, 1e-4, 0])
+    path = tmp_path / 'camera.yaml'
+    view = CameraView('wide', 1600, 1200, equidistant=True)
+    path.write_bytes(write(view, calibration, np.eye(10)))
+    assert 'distortion_model: equidistant' in path.read_text()
+    file = read_camera(path)
+    assert file.equidistant
+    np.testing.assert_allclose(file.calibration, calibration, rtol=1e-6, atol=1e-12)
+
+
 def test_opencv_reads_its_yaml(tmp_path: Path) -> None:
     covariance = np.diag(np.arange(1.0, 11.0) ** 2)
     covariance[0, 1] = covariance[1, 0] = -1.0
     covariance[9, 9] = 0
     path = tmp_path / 'camera.yaml'
-    path.write_bytes(opencv_yaml('left', 1600, 1200, CALIBRATION, covariance))
+    path.write_bytes(opencv_yaml(CameraView('left', 1600, 1200), CALIBRATION, covariance))
     file = cv2.FileStorage(str(path), cv2.FILE_STORAGE_READ)
     assert file.getNode('image_width').real() == 1600
     assert file.getNode('camera_name').string() == 'left'
@@ -283,7 +295,8 @@ def test_bad_calibrations_are_refused(tmp_path: Path, text: str, message: str) -
 @pytest.mark.parametrize(
     ('more', 'message'),
     [
-        ('distortion_model: equidistant', "distortion_model is 'equidistant'"),
+        ('distortion_model: omni', "distortion_model is 'omni'"),
+        ('distortion_model: equidistant\nD: [1, 2, 3]', 'are 4 numbers: k1, k2, k3, k4'),
         ('D: [1, 2, 3]', r'accepted are 4 or 5 numbers'),
         ('D: [1, 2, 3, 4, 5, 6, 7, 8]', r'of the rational model; accepted are 4 or 5 numbers'),
         ('D: [1, 2, 3, 4, 5, 0, 0, 0, 1, 0, 0, 0]', r'of a thin prism; accepted are 4'),
@@ -314,13 +327,14 @@ def test_a_calibration_of_kalibr_is_read(tmp_path: Path) -> None:
     assert (file.width, file.height) == (4000, 3000)
     expected = [3010, 2010.5, 1492.5, -0.08, 0.06, 0, 0.0003, -0.0002, 3000 / 3010 - 1, 0]
     np.testing.assert_allclose(file.calibration, expected, atol=1e-15)
-    for camera, model, message in (
-        ('pinhole', 'equidistant', "distortion_model is 'equidistant'"),
-        ('omni', 'radtan', "camera_model is 'omni'"),
-    ):
-        path.write_text(KALIBR.format(camera=camera, model=model))
-        with pytest.raises(ValueError, match=message):
-            read_camera(path)
+    path.write_text(KALIBR.format(camera='pinhole', model='equidistant'))
+    file = read_camera(path)
+    assert file.equidistant
+    expected[3:8] = [-0.08, 0.06, 0.0003, -0.0002, 0]
+    np.testing.assert_allclose(file.calibration, expected, atol=1e-15)
+    path.write_text(KALIBR.format(camera='omni', model='radtan'))
+    with pytest.raises(ValueError, match="camera_model is 'omni'"):
+        read_camera(path)
     path.write_text(KALIBR.format(camera='pinhole', model='radtan') + 'cam1: {}')
     with pytest.raises(ValueError, match='cam0, cam1, accepted is one camera a file'):
         read_camera(path)

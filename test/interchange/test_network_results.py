@@ -20,7 +20,7 @@ from support.networks import solution
 
 KEYS = {
     '': 'sigma0 redundancy unit cameras images points covariance_of_points rejected warnings',
-    'cameras': 'name width height fx fy cx cy distortion covariance',
+    'cameras': 'name width height fx fy cx cy distortion_model distortion covariance',
     'images': 'image camera rotation position covariance',
     'points': 'id x y z rays',
     'rejected': 'image id reason normalised_residual',

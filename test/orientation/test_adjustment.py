@@ -462,17 +462,6 @@ def test_targets_on_a_line_are_refused(scene):
         adjust(network, replace(truth, points=points))
 
 
-def test_mixed_zoom_is_a_warning(scene):
-    network, truth, start = scene
-    observations = network.observations
-    zoomed = observations.photograph >= 7
-    middle = truth.calibrations[0, 1:3]
-    xy = np.where(zoomed[:, None], middle + 1.2 * (observations.xy - middle), observations.xy)
-    network = replace(network, observations=replace(observations, xy=xy))
-    solution = adjust(network, start)
-    assert any('have another focal length' in text for text in solution.warnings)
-
-
 def test_photographs_of_a_plane_straight_on_do_not_determine_the_focal_length():
     random = np.random.default_rng(6)
     network, truth = simulate(replace(FIELD, planar=True), random)

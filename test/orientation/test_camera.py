@@ -57,12 +57,28 @@ def test_behind_the_camera_is_nan(scene):
     assert np.isnan(camera.project(CALIBRATION, rotation, position, behind)).all()
 
 
-@pytest.mark.parametrize('backward', [False, True])
-def test_derivatives_are_differences(scene, backward):
+def test_fisheye_lenses_are_those_of_opencv(scene):
+    rotation, position, points = scene
+    wide = points * [8, 8, 1]  # up to 70 degrees off the axis
+    matrix = np.array([[2002, 0, 1010], [0, 2000, 690], [0, 0, 1.0]])
+    distortion = np.array([0.05, 0.01, -0.004, 0.0005])
+    calibration = np.array([2000, 1010, 690, *distortion, 0, 1e-3, 0])
+    turn, shift = cv2.Rodrigues(rotation)[0], -rotation @ position
+    expected, _ = cv2.fisheye.projectPoints(wide[:, None], turn, shift, matrix, distortion)
+    xy = camera.project(calibration, rotation, position, wide, equidistant=True)
+    np.testing.assert_allclose(xy, expected[:, 0], atol=1e-8)
+    seen = (wide - position) @ rotation.T
+    ideal = camera.undistort(calibration, xy, equidistant=True)
+    np.testing.assert_allclose(ideal, seen[:, :2] / seen[:, 2:], atol=1e-9)
+
+
+@pytest.mark.parametrize(('backward', 'equidistant'), [(0, 0), (1, 0), (0, 1)])
+def test_derivatives_are_differences(scene, backward, equidistant):
     rotation, position, points = scene
     measured = camera.project(CALIBRATION, rotation, position, points) + 0.5
     measured = measured if backward else None
-    linear = camera.linearise(CALIBRATION, rotation, position, points, measured)
+    fisheye = (np.arange(len(points)) % 2 == 0) & bool(equidistant)  # every second one
+    linear = camera.linearise(CALIBRATION, rotation, position, points, measured, fisheye)
 
     def image(change):
         turned = camera.rotation_matrices(change[None, 13:16])[0] @ rotation
@@ -72,6 +88,7 @@ def test_derivatives_are_differences(scene, backward):
             position + change[10:13],
             points + change[16:],
             measured,
+            fisheye,
         )
 
     steps = np.array([1e-3] * 3 + [1e-6] * 16)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
 from itertools import pairwise
@@ -116,7 +117,7 @@ def test_the_frame_is_that_of_the_principal_axes():
     assert (solution.start.positions[:, 2] > 0).all()
 
 
-def test_a_fisheye_lens_is_named():
+def test_a_fisheye_lens_is_fitted():
     seen = taken(count=8, focal=1000.0, number=60)
     network = seen.network
     source = np.random.default_rng(9)
@@ -138,8 +139,13 @@ def test_a_fisheye_lens_is_named():
         covariance=np.tile(0.05**2 * np.eye(2), (inside.sum(), 1, 1)),
     )
     cameras = (CameraView('camera', 3000, 2000, 900.0),)
-    (solution, *_) = orient(replace(network, cameras=cameras, observations=observations))
-    assert any('an equidistant fisheye lens' in text for text in solution.warnings)
+    (solution,) = orient(replace(network, cameras=cameras, observations=observations))
+    assert any('an equidistant fisheye one' in text for text in solution.warnings)
+    assert solution.network.cameras[0].equidistant
+    assert solution.oriented.all() and solution.start.used.all()
+    assert solution.released[0] == ('f', 'cx', 'cy', 'k1', 'k2', 'k3', 'k4', 'affinity', 'shear')
+    found = solution.start.calibrations[0, :3] - [900, 1499.5, 999.5]
+    assert (np.abs(found) < 4 * np.sqrt(np.diag(solution.camera_covariances[0])[:3])).all()
 
 
 def test_two_photographs_are_never_a_network():
@@ -239,17 +245,33 @@ def test_portrait_and_landscape_are_two_cameras():
     assert solution.start.calibrations[:, 0] == pytest.approx(FOCAL, rel=5e-3)
 
 
-@pytest.mark.lasting
-def test_another_zoom_in_one_camera_is_said():
-    rotations, positions = ring(6, 35)
-    calibrations = np.stack(
-        [pinhole(FOCAL * (1.2 if index == 5 else 1), 3000, 2000) for index in range(6)]
-    )
-    camera, of = CameraView('camera', 3000, 2000), np.zeros(6, dtype=int)
+def zooming(zooms: Sequence[float]):
+    """Return one photograph of 20 targets a zoom, all of one camera, with its targets."""
+    rotations, positions = ring(len(zooms), 35)
+    calibrations = np.stack([pinhole(FOCAL * zoom, 3000, 2000) for zoom in zooms])
+    camera, of = CameraView('camera', 3000, 2000), np.zeros(len(zooms), dtype=int)
     points, random = field(20, 0.3), np.random.default_rng(1)
-    seen = photographed(points, rotations, positions, (camera,), of, calibrations, random)
+    return photographed(points, rotations, positions, (camera,), of, calibrations, random), points
+
+
+def test_another_zoom_gets_a_camera_of_its_own():
+    seen, points = zooming((1, 1, 1, 1.2, 1.2, 1, 1, 1))
     (solution,) = orient(seen.network)
-    assert any('5.png' in it and 'camera of their own' in it for it in solution.warnings)
+    assert solution.oriented.all()
+    assert any('2 of 8 photographs, such as 3.png' in it for it in solution.warnings)
+    assert solution.network.camera_of.tolist() == [0, 0, 0, 1, 1, 0, 0, 0]
+    assert solution.start.calibrations[:, 0] == pytest.approx([FOCAL, 1.2 * FOCAL], rel=0.01)
+    assert error(solution, points) < 1e-3
+
+
+@pytest.mark.lasting
+def test_each_photograph_may_have_its_own_zoom():
+    zooms = np.random.default_rng(4).uniform(0.9, 1.1, 12)
+    seen, points = zooming(zooms)
+    (solution,) = orient(seen.network)
+    assert solution.oriented.all()
+    focal = solution.start.calibrations[solution.network.camera_of, 0]
+    assert focal == pytest.approx(FOCAL * zooms, rel=0.01)
     assert error(solution, points) < 1e-3
 
 

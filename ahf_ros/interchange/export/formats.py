@@ -146,6 +146,7 @@ def write_network_export(format_name: str, folder: Path, solution: Solution) -> 
     A ValueError says what the format cannot hold, or which file cannot be written.
     """
     solution.check_forward()
+    solution.check_brown()
     kind = NETWORK_FORMATS[format_name]
     names = [PurePath(it).name for it in solution.network.photographs]
     if len(set(names)) < len(names) and not kind.paths:
