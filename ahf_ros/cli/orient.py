@@ -323,15 +323,17 @@ def _write(solution: Solution, number: int, options: argparse.Namespace) -> bool
     def folder_in(place: Path) -> Path:
         return place / f'group_{number + 1}' if number else place
 
+    def export(name: str, place: Path) -> None:
+        write_network_export(name, folder_in(place), solution)
+        if not options.quiet and (remark := network_remark(name, solution)):
+            tell('orient', remark)
+
     folder = folder_in(options.output)
     title = Path(options.observations).name
     steps: list[Callable[[], object]] = [
         partial(write_network, folder, solution),
         partial(write_network_page, folder / REPORT_FILE, solution, title),
-        *(
-            partial(write_network_export, name, folder_in(place), solution)
-            for name, place in options.export
-        ),
+        *(partial(export, name, place) for name, place in options.export),
     ]
     written = True
     for step in steps:
@@ -342,9 +344,6 @@ def _write(solution: Solution, number: int, options: argparse.Namespace) -> bool
             written = False
     if not options.quiet:
         print_network(solution, str(folder))
-        for name, _ in options.export:
-            if remark := network_remark(name, solution):
-                tell('orient', remark)
     try:
         write_mountings(solution, folder, options)
     except ValueError as error:
