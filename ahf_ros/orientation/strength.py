@@ -25,6 +25,7 @@ NO_CHECKS = 'no checks'
 
 _FEW_POINTS = 6  # observations, with which a pose has hardly a check
 _COVERED = 0.7  # of the half diagonal, that observations should reach
+_NAMED = 3  # cameras in a sentence
 _WEAK = 3.0  # times the median, of the largest standard deviation of a target
 
 
@@ -121,26 +122,36 @@ def _of_photographs(solution: Solution) -> Iterator[Weakness]:
 def _of_cameras(solution: Solution) -> Iterator[Weakness]:
     """Yield what would determine the calibrations better."""
     network, values = solution.network, solution.start
+    flat, empty, least = list[str](), list[str](), 1.0
     for place, view in enumerate(network.cameras):
         taken = (network.camera_of == place) & solution.oriented
         if view.fixed or not taken.any():
             continue
         if not rolled(values.rotations[taken]):
-            yield Weakness(
-                f'no photograph of camera {view.name} is rolled',
-                f'Camera {view.name}: no photograph is rolled by 90 degrees about its axis. Roll '
-                'some, so that the principal point can be determined.',
-            )
+            flat.append(view.name)
         seen = taken[network.observations.photograph] & values.used
         centre = (np.array([view.width, view.height]) - 1) / 2
         reached = np.linalg.norm(network.observations.xy[seen] - centre, axis=1)
         share = float(np.quantile(reached, 0.98) / np.linalg.norm(centre)) if seen.any() else 0.0
         if share < _COVERED:
-            yield Weakness(
-                f'no targets in the corners of camera {view.name}',
-                f'Camera {view.name}: targets reach only {100 * share:.0f} % of the way to the '
-                'corners. Fill the images, so that the distortion is known there, too.',
-            )
+            empty.append(view.name)
+            least = min(least, share)
+    if flat:
+        yield Weakness(
+            f'no photograph of {_cameras(flat)} is rolled',
+            f'C{_cameras(flat)[1:]}: no photograph is rolled by 90 degrees about its '
+            'axis. Roll some, so that the principal point can be determined.',
+        )
+    if empty:
+        yield Weakness(
+            f'no targets in the corners of {_cameras(empty)}',
+            f'C{_cameras(empty)[1:]}: targets reach only {100 * least:.0f} % of the way '
+            'to the corners. Fill the images, so that the distortion is known there, too.',
+        )
+
+
+def _cameras(names: Sequence[str]) -> str:
+    return f'camera {names[0]}' if len(names) == 1 else f'cameras {listed(names, _NAMED)}'
 
 
 def _of_scale(solution: Solution) -> Iterator[Weakness]:

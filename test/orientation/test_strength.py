@@ -123,3 +123,22 @@ def test_there_are_no_deviations_without_scale_or_ends() -> None:
     part = replace(whole, start=replace(whole.start, points=points))
     assert [it.bar.ends for it in bar_deviations(part)] == [('3', '4')]
     assert [it.point.name for it in control_deviations(part)] == ['6']
+
+
+def test_cameras_that_are_weak_alike_are_named_together() -> None:
+    whole = solution()
+    network, start = whole.network, whole.start
+    names = 'EOS R5', 'B', 'C', 'D', 'E', 'F'
+    several = replace(
+        whole,
+        network=replace(
+            network,
+            cameras=tuple(replace(network.cameras[0], name=name) for name in names),
+            camera_of=np.arange(6),
+        ),
+        start=replace(start, calibrations=np.tile(start.calibrations, (6, 1))),
+    )
+    (unrolled,) = advice(several, 'rolled by 90 degrees')
+    assert unrolled.startswith('Cameras EOS R5, B, C and 3 more: no photograph is rolled')
+    (corners,) = advice(several, 'corners')
+    assert corners.startswith('Cameras EOS R5, B, C and 3 more: targets reach only')

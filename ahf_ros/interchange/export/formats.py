@@ -52,12 +52,14 @@ class NetworkFormat:
     """A format of an adjusted network: what makes its files, and what its lens lacks.
 
     `writer` is as in `Format`. `lacks` is 'shear', or 'affinity and shear', or empty. `paths` says
-    whether names of photographs may be the same in several folders.
+    whether names of photographs may be the same in several folders. Without `cameras`, it holds
+    targets alone.
     """
 
     writer: str
     lacks: Literal['', 'shear', 'affinity and shear'] = ''
     paths: bool = False
+    cameras: bool = True
 
 
 _BOTH: Literal['affinity and shear'] = 'affinity and shear'
@@ -79,10 +81,10 @@ NETWORK_FORMATS: Mapping[str, NetworkFormat] = {
     ),
     'openmvg': NetworkFormat('interchange.export.sfm_data:openmvg_files', _BOTH, paths=True),
     'bundler': NetworkFormat('interchange.export.bundler:bundler_files'),
-    'ply': NetworkFormat(f'{_POINTS}:ply_files', paths=True),
-    'dxf': NetworkFormat(f'{_POINTS}:dxf_files', paths=True),
-    'vstars': NetworkFormat(f'{_POINTS}:vstars_files', paths=True),
-    'jag3d': NetworkFormat(f'{_POINTS}:jag3d_files', paths=True),
+    'ply': NetworkFormat(f'{_POINTS}:ply_files', cameras=False),
+    'dxf': NetworkFormat(f'{_POINTS}:dxf_files', cameras=False),
+    'vstars': NetworkFormat(f'{_POINTS}:vstars_files', cameras=False),
+    'jag3d': NetworkFormat(f'{_POINTS}:jag3d_files', cameras=False),
 }
 """The formats of adjusted networks."""
 
@@ -145,11 +147,12 @@ def write_network_export(format_name: str, folder: Path, solution: Solution) -> 
 
     A ValueError says what the format cannot hold, or which file cannot be written.
     """
-    solution.check_forward()
-    solution.check_brown()
     kind = NETWORK_FORMATS[format_name]
+    if kind.cameras:
+        solution.check_forward()
+        solution.check_brown()
     names = [PurePath(it).name for it in solution.network.photographs]
-    if len(set(names)) < len(names) and not kind.paths:
+    if kind.cameras and not kind.paths and len(set(names)) < len(names):
         raise ValueError(
             f'{format_name} knows images by their names, accepted are different names in all '
             'folders'
