@@ -383,3 +383,12 @@ def test_jag3d_has_the_whole_covariance(tmp_path: Path) -> None:
     named = replace(WHOLE, network=replace(WHOLE.network, targets=names))
     with pytest.raises(ValueError, match='a target without'):
         write_network_export('jag3d', tmp_path / 'named', named)
+
+
+def test_lists_of_points_need_no_lens(tmp_path: Path) -> None:
+    cameras = (replace(WHOLE.network.cameras[0], equidistant=True),)
+    fisheye = replace(WHOLE, network=replace(WHOLE.network, cameras=cameras))
+    for name in ('ply', 'dxf', 'vstars', 'jag3d'):
+        assert write_network_export(name, tmp_path / name, fisheye)
+    with pytest.raises(ValueError, match='has an equidistant fisheye lens, accepted are'):
+        write_network_export('openmvg', tmp_path / 'openmvg', fisheye)
