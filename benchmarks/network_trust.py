@@ -252,7 +252,7 @@ def _separation(network: Network, truth: Start, alone: MeasuredPoints) -> float:
     covariance = similarity_between(alone.xyz, points).turned(alone.covariance)
     known = Known(
         network.bars,
-        np.array([[rows[end] for end in bar.ends] for bar in network.bars]).reshape(-1, 2),
+        np.array([[rows[end] for end in bar.ends] for bar in network.bars], int).reshape(-1, 2),
         network.control,
         np.array([rows[it.name] for it in network.control], int),
         np.array([], int),

@@ -121,14 +121,19 @@ def adjust(
             lenses = start.calibrations if release is None else None
             model = _Model(network, free, lenses, backward)
             if test:
-                return _tested(model, start, datum or Datum(), keep_suspects)
-            start, datum, warnings = placed(network, start, datum or Datum())
-            return _solution(network, model.adjusted(start, datum), warnings)
+                solution = _tested(model, start, datum or Datum(), keep_suspects)
+            else:
+                start, datum, warnings = placed(network, start, datum or Datum())
+                solution = _solution(network, model.adjusted(start, datum), warnings)
     except np.linalg.LinAlgError as error:
         raise ValueError(
             'the network is singular: the targets of a photograph, or all, lie on a line, or bars '
             'and control points without variance repeat each other'
         ) from error
+    if solution.sigma0 > MISFIT:
+        misfit = _MISFITS.format(solution.sigma0)
+        solution = replace(solution, warnings=(*solution.warnings, misfit))
+    return solution
 
 
 @dataclass(frozen=True)
@@ -239,8 +244,6 @@ def _solution(network: Network, result: Adjusted, warnings: tuple[str, ...]) -> 
     warnings += undetermined(network, layout, result.state, covariance)
     warnings += unlike_given(network, result.state.calibrations)
     warnings += unlike_pixels(network, layout, result.state, covariance)
-    if unit.sigma0 > MISFIT:
-        warnings += (_MISFITS.format(unit.sigma0),)
     if not result.converged:
         warnings += ('the adjustment did not converge: its coordinates are not final',)
     used = np.zeros(len(residuals), dtype=bool)

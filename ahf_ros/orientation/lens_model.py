@@ -52,7 +52,11 @@ def with_fisheye_lenses(solution: Solution) -> tuple[Network, Start] | None:
 
 def fisheye_lenses(network: Network, solution: Solution) -> tuple[str, ...]:
     """Return which lenses turned out to be equidistant ones."""
-    given = {view.name for view in network.cameras if view.equidistant}
+    given = {
+        solution.network.cameras[found].name
+        for found, usual in zip(solution.network.camera_of, network.camera_of, strict=True)
+        if network.cameras[usual].equidistant
+    }
     return tuple(
         f"camera {view.name}: its lens is an equidistant fisheye one. Brown's model does not "
         'describe it at the border of the images, so that of Kannala and Brandt is used'

@@ -19,6 +19,7 @@ from ahf_ros.orientation.resection import FEWEST_POINTS, Resection, resections
 from ahf_ros.orientation.solution import Solution, Start
 from ahf_ros.orientation.triples import LENS, STEPS, focal_steps
 from ahf_ros.orientation.views import View, lengths_of, spread_of
+from ahf_ros.text import counted
 
 _ZOOMED = 0.01  # change of a photograph's focal length that is another zoom
 _SUSPECT = 0.8  # share of a photograph's observations that agree, below which its zoom is tested
@@ -43,6 +44,12 @@ def with_own_zooms(
     known = np.bincount(photograph[~np.isnan(lengths)], minlength=len(posed))
     agree = np.bincount(photograph[start.used], minlength=len(posed))
     suspect = posed & ((agree < _SUSPECT * known) | (spread_of(lengths) > _LARGE_SPREAD))
+    for camera, view in enumerate(network.cameras):
+        mine = posed & (network.camera_of == camera)
+        if (
+            view.fixed and 2 * suspect[mine].sum() > mine.sum()
+        ):  # it is the calibration that is wrong
+            suspect[mine] = False
     lenses, calibrations = start.calibrations[network.camera_of], start.calibrations.copy()
     if suspect.any():
         own = np.flatnonzero(suspect)
@@ -127,12 +134,13 @@ def of_other_zooms(network: Network, solution: Solution) -> tuple[str, ...]:
         other = np.flatnonzero(mine & (np.array(names) != np.array(usual)))
         if len(other):
             lengths = solution.start.calibrations[own.camera_of[mine], 0]
+            cameras = counted(len(set(own.camera_of[other].tolist())), 'camera')
             warnings.append(
                 f'camera {view.name}: {len(other)} of {mine.sum()} photographs, such as '
-                f'{network.photographs[other[0]]}, have another focal length than the rest: from '
-                f'{lengths.min():.0f} to {lengths.max():.0f} px. They have '
-                f'{len(set(own.camera_of[other].tolist()))} cameras of their own. Without zoom or '
-                'focus in between, coordinates are more precise'
+                f'{network.photographs[other[0]]}, have another focal length than the rest, or '
+                f'than each other, and {cameras} of their own: from {lengths.min():.0f} to '
+                f'{lengths.max():.0f} px. Without zoom or focus in between, coordinates are more '
+                'precise'
             )
     return tuple(warnings)
 

@@ -235,6 +235,7 @@ def test_image_points_that_fit_badly_are_a_warning(scene):
     (warning,) = adjust(small, start, release=RELEASED, test=False).warnings
     assert re.match('sigma0 is (9|10)[.].*: image points fit so many times worse', warning)
     assert adjust(network, start, release=RELEASED, test=False).warnings == ()
+    assert any('sigma0 is' in it for it in adjust(small, start, release=RELEASED).warnings)
 
 
 def test_three_fixed_targets_are_the_axes(scene):
@@ -320,6 +321,15 @@ def test_one_bar_cannot_be_checked(scene):
     solution = adjust(network, start)
     assert not solution.suspects
     assert any('0-1 is believed: nothing checks it' in text for text in solution.warnings)
+
+
+@pytest.mark.parametrize(('count', 'said'), [(2, True), (3, False)])
+def test_bars_that_cannot_tell_which_is_wrong_are_said(scene, count, said):
+    network, truth, start = scene
+    ends = [(0, 1), (2, 3), (4, 5)][:count]
+    bars = tuple(ScaleBar((str(a), str(b)), distance(truth.points, a, b), 0.001) for a, b in ends)
+    solution = adjust(replace(network, bars=bars, unit='m'), start)
+    assert any('too few to tell which one is wrong' in it for it in solution.warnings) == said
 
 
 def test_a_check_bar_that_fails_is_a_suspect(scene):

@@ -148,6 +148,19 @@ def test_a_fisheye_lens_is_fitted():
     assert (np.abs(found) < 4 * np.sqrt(np.diag(solution.camera_covariances[0])[:3])).all()
 
 
+def test_targets_at_one_place_in_the_image_give_no_pose():
+    seen = taken(focal=FOCAL)
+    observed = seen.network.observations
+    last, random = observed.photograph == 5, np.random.default_rng(2)
+    xy = observed.xy.copy()
+    xy[last] = random.normal([2500, 900], 0.05, (last.sum(), 2))
+    network = replace(seen.network, observations=replace(observed, xy=xy))
+    (solution,) = orient(network)
+    assert solution.oriented.tolist() == [True] * 5 + [False]
+    assert any('5.png: not oriented, all targets are at one' in it for it in solution.warnings)
+    assert error(solution, seen.points) < 1e-3
+
+
 def test_two_photographs_are_never_a_network():
     """What is left of three photographs of which one contradicts the others is no network."""
     network = taken(count=3, focal=FOCAL).network
