@@ -160,7 +160,7 @@ def test_gaps_tell_how_often_light_has_edges() -> None:
 
 def by_levels(
     of: PolarImages,
-    light: float | None = 200.0,
+    light: float | np.ndarray | None = 200.0,
     spread: float = 0.05,
     shares: tuple[float, ...] = (),
 ) -> Evidence:
@@ -197,6 +197,14 @@ def test_a_stretch_in_light_that_nothing_predicts_says_nothing() -> None:
     evidence = by_levels(polar(light))
     assert not evidence.paper[0, :, 12:24].any() and not evidence.ink[0, :, 12:24].any()
     assert (evidence.ink > evidence.paper)[0, :, 24:].tolist() == [MARKED[24:].tolist()] * 2
+
+
+def test_what_is_as_dark_as_ink_behind_a_plate_predicts_no_light_on_it() -> None:
+    shadow = np.full((ANGLES, 5), 200.0)
+    shadow[12:24, 2] = 60.0  # in the band, and neither in the gap nor beyond
+    evidence = by_levels(polar(), shadow)
+    marked = MARKED[12:24]
+    assert marked.any() and (evidence.paper < evidence.ink + 0.5)[0, :, 12:24][:, marked].all()
 
 
 def test_a_dot_of_light_on_paper_is_no_ink() -> None:
