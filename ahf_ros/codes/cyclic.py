@@ -27,6 +27,11 @@ class CyclicFamily:
         """Return the smallest of all words that are the same code, ndarray of int64."""
         return smallest_rotation(words, self.bits)
 
+    def has(self, codes: np.ndarray) -> np.ndarray:
+        """Return whether canonical words are among these, ndarray of bool."""
+        index = np.minimum(np.searchsorted(self.words, codes), self.words.size - 1)
+        return np.asarray(self.words[index] == codes)
+
     def ids(self, words: Any) -> np.ndarray:
         """Return the IDs of words wherever their reading begins, 0 where there is none."""
         codes = self.canonical(words)

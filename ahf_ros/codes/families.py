@@ -32,7 +32,9 @@ KINDS: dict[str, tuple[str, ...]] = {
 }
 """The families of each kind."""
 
-FAMILY_NAMES = tuple(name for names in KINDS.values() for name in names)
+_KIND_OF = {name: kind for kind, names in KINDS.items() for name in names}
+
+FAMILY_NAMES = tuple(_KIND_OF)
 """The families that `family` accepts."""
 
 AUTO = 'auto'
@@ -130,10 +132,7 @@ def family_in(text: str, files: str = '') -> str:
 
 def kind_of(name: str, files: str = '') -> str:
     """Return the kind of a family, see `KINDS`; `files` are as for `families_in`."""
-    for kind, names in KINDS.items():
-        if name in names:
-            return kind
-    return families_of(files)[name].kind
+    return _KIND_OF.get(name) or families_of(files)[name].kind
 
 
 def code_family(name: str, files: str = '') -> Family | DotFamily | PointFamily | CircleFamily:

@@ -327,6 +327,6 @@ def words_of_prints(
     found: list[dict[Family, int]] = [{} for _ in words]
     for other in alike:
         of_print = spread[other.bits]
-        for index in np.flatnonzero(np.isin(of_print, other.words)).tolist():
+        for index in np.flatnonzero(other.has(of_print)).tolist():
             found[index][other] = int(of_print[index])
     return found

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
+from functools import cache, lru_cache
 from typing import Any
 
 import cv2
@@ -37,6 +37,7 @@ def has_dictionary(name: str) -> bool:
     return hasattr(cv2, 'aruco') and hasattr(cv2.aruco, 'ArucoDetector') and bool(_member(name))
 
 
+@cache
 def _member(name: str) -> str:
     """Return what cv2.aruco calls a dictionary, '' if it has none."""
     known = {member.lower(): member for member in dir(cv2.aruco)}

@@ -162,6 +162,15 @@ class Searching(Protocol):
 
 
 @runtime_checkable
+class Explaining(Searching, Protocol):
+    """A detector that also tells which dots of an image its targets do not explain."""
+
+    def explain(self, pyramid: ImagePyramid) -> tuple[list[Target], np.ndarray]:
+        """Return the targets, and the frames of dots that are on none of them, (k, 3, 3), px."""
+        ...
+
+
+@runtime_checkable
 class Narrowing(Protocol):
     """A detector of many families that can be made to look for some of them only."""
 

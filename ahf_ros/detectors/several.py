@@ -4,7 +4,7 @@ What a detector takes for a target may be a part of another one: the dot of a ri
 of many. A place belongs to one target, the surer one, of equally sure ones the larger. Where all
 families are looked for and one detector finds targets of its own beyond doubt, the next ones look
 at an image in which these are painted over, which takes them a fraction of the time; those that
-search for dots do not where no outline of a circle is left.
+search for dots do not where the first one left none that its targets do not explain.
 """
 
 from __future__ import annotations
@@ -26,18 +26,17 @@ from ahf_ros.detectors.contract import (
     Drafter,
     EarlyStopping,
     Expecting,
+    Explaining,
     Refiner,
     Searching,
 )
 from ahf_ros.detectors.evidence import is_clear
 from ahf_ros.detectors.explained import without_targets
 from ahf_ros.features.common_search import CommonSearch
-from ahf_ros.features.dot_search import whole_outlines
 from ahf_ros.features.pyramid import ImagePyramid, image_pyramid
 from ahf_ros.imaging.image import as_gray, check_image
 from ahf_ros.target import UNDECODED, DottedTarget, Target, sorted_targets
 
-_SMALLEST = 1.0  # radius of an outline in a half of the image that any detector looks for, px
 _DIGITS = 2  # of a confidence, beyond which one is not surer than another
 
 
@@ -112,21 +111,31 @@ class SeveralDetector:
     ) -> list[list[Target]]:
         """Return the targets of each detector; those that search for dots do so together."""
         check_image(image)
-        searching = sum(isinstance(it, Searching) for it in self.parts) > 1
-        left, pyramid, outlined = image, self._pyramid(image) if searching else None, True
+        shared = sum(isinstance(it, Searching) for it in self.parts) > 1
+        pyramid: ImagePyramid | None = None
+        dots: np.ndarray | None = None  # that no target explains, once these are known
         results: list[list[Target]] = []
+        left = image
         for part in self.parts:
-            passed = not outlined and isinstance(part, Searching)
-            if passed or left.min() == left.max():  # all that there was is painted over
+            together = shared and isinstance(part, Searching)
+            nothing = together and left is not image and dots is not None and not len(dots)
+            if nothing or left.min() == left.max():  # all that there was is painted over
                 results.append([])
+                continue
+            if together and pyramid is None:
+                pyramid = self._pyramid(left)
+            if pyramid and isinstance(part, Explaining):
+                found, dots = part.explain(pyramid)
+                dots = None if self.settings.report_undecoded else dots
             elif pyramid and isinstance(part, Searching):
-                results.append(part.search(pyramid))
+                found = part.search(pyramid)
             else:
-                results.append(alone(part, left))
-            if self.family == AUTO and is_clear(results[-1]):
-                left = without_targets(left, [it for it in results[-1] if it.id != UNDECODED])
-                pyramid = self._pyramid(left) if searching else None
-                outlined = self.settings.report_undecoded or not pyramid or has_outlines(pyramid)
+                found = alone(part, left)
+            results.append(found)
+            if self.family == AUTO and is_clear(found):
+                known = [it for it in found if it.id != UNDECODED]
+                left, pyramid = without_targets(left, known), None
+                dots = dots if dots is None else _beside(dots, known)
         return results
 
     def _pyramid(self, image: np.ndarray) -> ImagePyramid:
@@ -172,13 +181,12 @@ class SeveralDetector:
             yield target if known else replace(target, family=families[0])
 
 
-def has_outlines(pyramid: ImagePyramid) -> bool:
-    """Return whether an image has whole outlines of circles of any size.
-
-    Where targets are painted over that leave no doubt, light shows others by some at the least.
-    """
-    sizes = _SMALLEST, max(pyramid.gray.shape)
-    return any(len(whole_outlines(edges, *sizes).frames) for edges in pyramid.edges)
+def _beside(dots: np.ndarray, targets: Sequence[Target]) -> np.ndarray:
+    """Return the frames of dots, shape (k, 3, 3), whose centres are on none of some targets."""
+    x, y, reach = np.array([(it.x, it.y, _radius(it)) for it in targets]).T
+    away = np.hypot(dots[:, :1, 2] - x, dots[:, 1, 2, None] - y)
+    beside: np.ndarray = dots[(away >= reach).all(axis=1)]
+    return beside
 
 
 def _radius(target: Target) -> float:

@@ -10,6 +10,7 @@ import math
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass, field, fields, replace
+from functools import cache
 from numbers import Integral, Real
 from typing import Any
 
@@ -125,6 +126,11 @@ def parameter(
 
 def parameters(settings: Any) -> tuple[Parameter, ...]:
     """Return the parameters of a settings dataclass or of an instance, in order."""
+    return _of_type(settings if isinstance(settings, type) else type(settings))
+
+
+@cache
+def _of_type(settings: Any) -> tuple[Parameter, ...]:
     return tuple(
         replace(item.metadata[_KEY], name=item.name)
         for item in fields(settings)

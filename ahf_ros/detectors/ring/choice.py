@@ -11,9 +11,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ahf_ros.codes.ring import Family, words_of_print
+from ahf_ros.codes.ring import Family
 from ahf_ros.detectors.ring.decoding import DOUBT
-from ahf_ros.detectors.ring.families import contested, decoded, present_families
+from ahf_ros.detectors.ring.families import contested, present_families, words_shown
 from ahf_ros.detectors.ring.hypotheses import Hypotheses
 from ahf_ros.detectors.ring.proposals import HOPEFUL, Print, bounds, measure_likely
 from ahf_ros.detectors.ring.reading import read_bands
@@ -83,10 +83,7 @@ def _words_shown(
             read.append(_read(gray, dots.select(some), same))
             every = Hypotheses.joined(read)
             if np.prod(1 - every.confidence) < _DOUBTED:
-                return [
-                    words_of_print(code, word, families)
-                    for code, word in zip(every.families, decoded(every)[1].tolist(), strict=True)
-                ]
+                return words_shown(every, families)
     return []
 
 
@@ -124,8 +121,16 @@ def _read(gray: np.ndarray, dots: Fit, families: Sequence[Family]) -> Hypotheses
         if any(has_all(of, code) and len(code.words) < len(of.words) for of in families)
     ]
     found = [read_bands(gray, dots, code) for code in families if code not in narrow]
+    read = _shown(found)
+    if np.prod(1 - read.confidence) < _DOUBTED:
+        return read  # whose prints the others may have, too
     conceivable = np.any([of.confidence >= _CONCEIVABLE for of in found], axis=0)
     if conceivable.any():
         found += [read_bands(gray, dots.select(conceivable), code) for code in narrow]
+    return _shown(found)
+
+
+def _shown(found: Sequence[Hypotheses]) -> Hypotheses:
+    """Return the certain ones of what families read, of each dot the best."""
     read = contested(Hypotheses.joined(found))
     return read.select(read.certain & (read.coded > -DOUBT))

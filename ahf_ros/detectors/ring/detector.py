@@ -46,6 +46,7 @@ from ahf_ros.imaging.image import as_gray, check_image
 from ahf_ros.target import UNDECODED, Target, UndecodedTarget, sorted_targets
 
 _PART = 128  # dots of one colour that are read at a time
+_IN_PLACE, _EXACT = 0.6, 0.5  # edges of a dot: least share of them, largest deviation, px
 _UNLIKELY = 0.02  # confidence of a word below which a dot counts as unread
 
 
@@ -86,11 +87,16 @@ class RingDetector:
         check_image(image)
         return self.search(image_pyramid(as_gray(image), self.settings.max_radius))
 
-    @one_blas_thread()
     def search(self, pyramid: ImagePyramid) -> list[Target]:
         """Identify the targets of one image; see `Searching`."""
+        return self.explain(pyramid)[0]
+
+    @one_blas_thread()
+    def explain(self, pyramid: ImagePyramid) -> tuple[list[Target], np.ndarray]:
+        """Identify the targets of one image, and say what dots are left; see `Explaining`."""
         hypotheses = hypotheses_in(pyramid, self.settings, self.expected)
-        return report(hypotheses, self.settings, self.contested)
+        found = report(hypotheses, self.settings, self.contested)
+        return found, unexplained(hypotheses).frames
 
     @one_blas_thread()
     def refine(self, image: np.ndarray, targets: Sequence[Target]) -> list[Target]:
@@ -281,6 +287,18 @@ def _read(
                 rest = NO_FITS
             left[index] = rest
     return seen
+
+
+def unexplained(hypotheses: Hypotheses) -> Hypotheses:
+    """Return the dots on no certain target whose edges are where they should be.
+
+    Light makes others of its edges, whose dots are mostly much larger and little like ellipses.
+    """
+    explained = Explained.by(hypotheses.select(hypotheses.certain))
+    exact = hypotheses.deviation * frame.mean_radii(hypotheses.frames) < _EXACT
+    exact &= hypotheses.share >= _IN_PLACE
+    left = hypotheses.select(exact & ~hypotheses.certain)
+    return left.select(~explained.on_them(left.frames, 0))
 
 
 def report(

@@ -82,6 +82,16 @@ def decoded(hypotheses: Hypotheses) -> tuple[np.ndarray, np.ndarray, np.ndarray]
     return names, codes, ids
 
 
+def words_shown(hypotheses: Hypotheses, families: Sequence[Family]) -> list[dict[Family, int]]:
+    """Return the words that the prints of k readings are, by those of some families."""
+    codes = decoded(hypotheses)[1]
+    prints: dict[int, dict[Family, int]] = {}
+    for code in dict.fromkeys(hypotheses.families):
+        own = np.flatnonzero(hypotheses.families == code)
+        prints |= zip(own.tolist(), words_of_prints(code, codes[own], families), strict=True)
+    return [prints[index] for index in sorted(prints)]
+
+
 def settle_same_prints(hypotheses: Hypotheses, families: Sequence[Family]) -> Hypotheses:
     """Assign prints shared by several families to one of them, or mark them uncertain.
 
@@ -90,13 +100,9 @@ def settle_same_prints(hypotheses: Hypotheses, families: Sequence[Family]) -> Hy
     """
     if len(families) == 1:
         return hypotheses
-    codes = decoded(hypotheses)[1]
     certain = np.flatnonzero(hypotheses.certain).tolist()
-    prints: dict[int, dict[Family, int]] = {}
-    for code in dict.fromkeys(hypotheses.families[certain]):
-        own = [index for index in certain if hypotheses.families[index] is code]
-        prints |= zip(own, words_of_prints(code, codes[own], families), strict=True)
-    prints = {index: prints[index] for index in certain}
+    shown = words_shown(hypotheses.select(certain), families)
+    prints = dict(zip(certain, shown, strict=True))
     present, sure = present_families(list(prints.values()))
     options = {
         index: _narrowest({code: word for code, word in words.items() if code in present})

@@ -109,7 +109,7 @@ def word_ceilings(
 def has_all(code: Family, other: Family) -> bool:
     """Return whether a family has all words of another one, in the same print."""
     same = (code.band, code.bits) == (other.band, other.bits)
-    return same and bool(np.isin(other.words, code.words).all())
+    return same and bool(code.has(other.words).all())
 
 
 def odds(read: Hypotheses) -> np.ndarray:
