@@ -1,7 +1,9 @@
 """What may help where no target is identified: only what a second look at the image measures.
 
 It is a look at the part of the image with the most dots, so that its time and memory are bounded,
-and at the whole image reduced to as many pixels where that part says nothing.
+and at the whole image reduced to as many pixels where that part says nothing. Dozens of rings of
+an unknown family may be small, and spread among thousands of other dots: in the end, the bands of
+more dots are looked at in the whole image.
 Targets are looked for where the dots are few. Where they are many, as in texture, text and arrays
 of spots, only the bands of the clearest ones are looked at.
 """
@@ -57,9 +59,13 @@ _MAXIMUM_ENLARGED = 2**19  # the same, of what is enlarged
 _PLACED = 2**22  # pixels of the image in which the part is chosen, at the most
 _TILE = 64  # of that image, whose dots are counted, px
 _CLEAREST = 64  # dots whose bands are looked at
+_DOZENS = 256  # the same, in whole images
+_WHOLE = 2**24  # pixels of a whole image, which is reduced to as many
+_MOST = 1500  # dots of a part, beside which targets are looked for; texture has more
 _FEW, _SPARSE = 120, 0.1  # dots, and share of edge pixels, up to which targets are looked for
 _AMPLE = 1.25  # times the minimum radius, which even light needs
 _SURE = 10.0  # log odds of the number of sectors
+_BEYOND_DOUBT = 100.0  # the same, where a dozen targets or more show it
 _MISPLACED = 1.5  # px, growth of ink that leaves a doubt of the radii of a band
 _EXACT = 0.02  # dot radii, spread of the edges of bands that light does not blur
 
@@ -113,9 +119,12 @@ def _advice(
     image: np.ndarray, part: np.ndarray, settings: DetectorSettings, expected: int
 ) -> list[str]:
     """Return what a part of an image says, or else the whole of it."""
-    lines = list(filter(None, _lines(part, settings, expected)))
+    dots = dots_in(part, DetectorSettings())
+    lines = list(filter(None, _lines(part, dots, settings, expected)))
     if not lines and part.size < image.size:
         lines = list(filter(None, _of_whole(as_gray(image), settings, expected)))
+    if not lines and _count(dots) <= _MOST:
+        lines = list(filter(None, _of_dozens(as_gray(image), settings, expected)))
     return lines
 
 
@@ -149,8 +158,9 @@ class Adviser:
             self.lines = lines if self._in_a_row else []
 
 
-def _lines(image: np.ndarray, settings: DetectorSettings, expected: int) -> Iterator[str]:
-    dots = dots_in(image, DetectorSettings())
+def _lines(
+    image: np.ndarray, dots: list[DotsOfOctave], settings: DetectorSettings, expected: int
+) -> Iterator[str]:
     few = _are_few(dots)
     read = _read(image, settings) if few else []
     if repeated := repeated_targets(read):
@@ -190,6 +200,16 @@ def _of_whole(gray: np.ndarray, settings: DetectorSettings, expected: int) -> It
         yield from _of_bands(learnt, 1 / times, settings, expected)
     elif _are_few(dots):
         yield next(_of_others(reduced, settings), '')  # of edges it tells little
+
+
+def _of_dozens(gray: np.ndarray, settings: DetectorSettings, expected: int) -> Iterator[str]:
+    """Yield what the rings of a whole image show, where they leave no doubt."""
+    times = max(1, ceil((gray.size / _WHOLE) ** 0.5))
+    if times > 1:
+        gray = cv2.resize(gray, None, fx=1 / times, fy=1 / times, interpolation=cv2.INTER_AREA)
+    learnt = _learnt([dots_in(gray, DetectorSettings())], _DOZENS)
+    if learnt and learnt.lead > _BEYOND_DOUBT:
+        yield from _of_bands(learnt, 1 / times, settings, expected)
 
 
 def _of_others(image: np.ndarray, settings: DetectorSettings) -> Iterator[str]:
@@ -235,12 +255,16 @@ def _are_few(dots: list[DotsOfOctave]) -> bool:
     """Return whether an image has so few dots and edges that targets may be looked for."""
     marked = [octave.pyramid.edges[0] for octave, _ in dots]
     many = any(len(edges.x) > _SPARSE * edges.marked.size for edges in marked)
-    return not many and sum(len(of.frames) for _, each in dots for of in each) <= _FEW
+    return not many and _count(dots) <= _FEW
 
 
-def _learnt(images: Iterable[list[DotsOfOctave]]) -> LearntFamily | None:
+def _count(dots: list[DotsOfOctave]) -> int:
+    return sum(len(of.frames) for _, each in dots for of in each)
+
+
+def _learnt(images: Iterable[list[DotsOfOctave]], most: int = _CLEAREST) -> LearntFamily | None:
     """Return the family of most dots with a band, if its number of sectors is sure."""
-    families = learn_families(bands_about(images, _CLEAREST))
+    families = learn_families(bands_about(images, most))
     return families[0] if families and families[0].lead > _SURE else None
 
 
@@ -254,7 +278,8 @@ def _of_bands(
     rings = settings.narrowed(known or FAMILY_NAMES)
     size = _of_size(count, float(np.median(found.bands.size)) / scale, rings)
     edges = edge_shift_remark(found.growth * polarity / scale)
-    exact = scale <= 1 and np.median(found.bands.spread) < _EXACT
+    sure = np.median(found.bands.spread) < _EXACT or found.lead > _BEYOND_DOUBT
+    exact = scale <= 1 and sure
     dots = f'{count} dots with a band of {found.bits} sectors'
     if known and not set(known) & set(settings.families):
         yield f'{dots}: --family {" or ".join(known)}'
