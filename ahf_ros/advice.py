@@ -23,7 +23,7 @@ from statistics import median
 import cv2
 import numpy as np
 
-from ahf_ros.codes import RING_NAMES
+from ahf_ros.codes import RING_NAMES, SQUARE_NAMES
 from ahf_ros.codes.families import AUTO, families_of
 from ahf_ros.codes.ring import FAMILY_NAMES, Family, family, words_of_print
 from ahf_ros.detectors import Contesting, create_detector
@@ -170,6 +170,9 @@ def _lines(
         yield from _of_bands(learnt, 1, settings, expected)
     if learnt or not few:
         return
+    if mirrored := _of_mirrored(image, settings):
+        yield mirrored
+        return
     if settings.family == AUTO and (likely := _likely(read)):
         ((name, count),) = Counter(target.family for target in likely).most_common(1)
         target = counted(count, 'target')
@@ -221,6 +224,18 @@ def _of_others(image: np.ndarray, settings: DetectorSettings) -> Iterator[str]:
         ((name, count),) = Counter(target.family for target in found).most_common(1)
         yield f'{counted(count, "target")} of {name}: --family {name}'
         yield edge_shift_remark(median_edge_shift(found))
+
+
+def _of_mirrored(image: np.ndarray, settings: DetectorSettings) -> str:
+    """Return how many square markers are mirrored, which makes others of them or none."""
+    squares = [name for name in settings.families if name in SQUARE_NAMES]
+    if not squares:
+        return ''
+    flipped = np.ascontiguousarray(image[:, ::-1])
+    found = evident(_identified(flipped, settings.narrowed(squares)))
+    for name, count in Counter(target.family for target in found).most_common(1):
+        return f'{counted(count, "target")} of {name} mirrored: flip the images, or print anew'
+    return ''
 
 
 def _likely(read: Sequence[Target]) -> list[Target]:

@@ -85,6 +85,13 @@ def test_a_second_look_says_why_nothing_was_identified(
         assert re.match(expected, line)
 
 
+@pytest.mark.parametrize('family', ['apriltag_36h11', 'auto'])
+def test_square_markers_in_a_mirror_are_told(family: str) -> None:
+    image = np.ascontiguousarray(shown(family='apriltag_36h11', dot_radius=12, targets=4)[:, ::-1])
+    lines = advice(image, DetectorSettings(family=family))
+    assert lines == ['4 targets of apriltag_36h11 mirrored: flip the images, or print anew']
+
+
 def test_a_family_that_nobody_knows_is_to_be_learnt(tmp_path) -> None:
     file = tmp_path / 'mine.yaml'
     file.write_text('family: mine\nbits: 9\nband: [1.6, 2.4]\nwords: all\n')
