@@ -6,6 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
+from ahf_ros.codes import square
 from ahf_ros.codes.square import SQUARE_NAMES, dictionary, marker, words
 from support.square_markers import needs_square_markers
 
@@ -51,6 +52,15 @@ def test_an_opencv_without_markers_is_named(monkeypatch):
         dictionary('aruco_4x4_50')
 
 
+@pytest.fixture
+def unknown_members():
+    """Let the names of dictionaries be looked up anew, before and after a test."""
+    square._member.cache_clear()
+    yield
+    square._member.cache_clear()
+
+
+@pytest.mark.usefixtures('unknown_members')
 def test_an_opencv_without_a_dictionary_is_named(monkeypatch):
     for member in ('DICT_ARUCO_MIP_36h12', 'DICT_ARUCO_MIP_36H12'):
         monkeypatch.delattr(cv2.aruco, member, raising=False)

@@ -53,10 +53,14 @@ def test_readings_that_contradict_each_other(places, odds, ids, confidence, kept
     assert resolved(places, odds, ids, confidence) == (kept, certain)
 
 
-def test_of_two_claims_to_an_id_the_clearly_better_one_stays():
-    places, ids = [50, 150, 250], [1, 2, 1]
-    assert resolved(places, [30, 20, 10], ids, [1, 1, 1])[1] == [True, True, False]
-    assert resolved(places, [30, 20, 16], ids, [1, 1, 1])[1] == [False, True, False]
+def test_of_two_claims_to_an_id_the_clearly_surer_one_stays():
+    places, odds, ids = [50, 150, 250], [30, 20, 10], [1, 2, 1]
+    assert resolved(places, odds, ids, [0.99, 0.98, 0.8])[1] == [True, True, False]
+    assert resolved(places, odds, ids, [0.9, 0.8, 0.76])[1] == [False, True, False]
+
+
+def test_two_targets_beyond_doubt_that_have_one_id_were_printed_twice():
+    assert resolved(APART, [217, 86], [1, 1], [0.999, 0.955])[1] == [False, False]
 
 
 def test_sectors_of_a_band_that_was_read_are_no_dots():

@@ -13,7 +13,7 @@ from ahf_ros.detectors.ring.hypotheses import Hypotheses
 from ahf_ros.features import frame
 from ahf_ros.features.shape_votes import NEIGHBOURS
 
-_CLEARLY = 2.0  # times the evidence of another claim to the same ID or dot
+_CLEARLY = 2.0  # times the evidence of another claim to the same dot
 _FOREIGN = 10.0  # log odds of arcs of any length against a word, which is none then
 _OTHER_COLOUR = 0.2  # of a foreign band, that a target of the other colour counts for
 _ROUND = 0.6  # share of the edges of a word that are in their place, where there is a band
@@ -21,7 +21,8 @@ _CODED = 5.0  # odds of words against arcs of any length, before any is read
 _OVERLAP = 0.92  # of the radii of two targets, at which the paper of one hides marks of the other
 _SHEAR = 0.5  # ln of axes, by which a shape differs from those of all targets beside it
 _ODD = 10.0  # odds against a target in another shape than those beside it
-_ON_TOP = 3.0  # times as sure of its word as of what lies below it
+_BEYOND_DOUBT = 20.0  # times as likely right as wrong, from which none is surer of its ID
+_SURER = 3.0  # times as sure of its word as of what lies below it, or has its ID elsewhere
 
 
 def among_others(hypotheses: Hypotheses) -> Hypotheses:
@@ -96,8 +97,10 @@ def resolve(hypotheses: Hypotheses, ids: np.ndarray) -> tuple[np.ndarray, np.nda
     kept = owners(len(ids), on_it)
     certain = kept & leading(marked, hypotheses.certain, against, _CLEARLY, CLEAR)
     sure = 1 / (1 - hypotheses.confidence + np.finfo(float).eps)
-    certain = leading(sure, certain, overlapping(hypotheses), _ON_TOP)
-    return kept, leading(marked, certain, lambda index: ids == ids[index], _CLEARLY)
+    certain = leading(sure, certain, overlapping(hypotheses), _SURER)
+    # One of two that have an ID is wrong, unless it was printed twice: both are then beyond doubt.
+    sure = np.minimum(sure, _BEYOND_DOUBT)
+    return kept, leading(sure, certain, lambda index: ids == ids[index], _SURER)
 
 
 def on_targets(hypotheses: Hypotheses, certain: np.ndarray) -> Rivals:
