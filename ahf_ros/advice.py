@@ -26,6 +26,7 @@ import numpy as np
 from ahf_ros.codes import RING_NAMES, SQUARE_NAMES
 from ahf_ros.codes.families import AUTO, families_of
 from ahf_ros.codes.ring import FAMILY_NAMES, Family, family, words_of_print
+from ahf_ros.codes.square import has_dictionary
 from ahf_ros.detectors import Contesting, create_detector
 from ahf_ros.detectors.contract import DetectorSettings
 from ahf_ros.detectors.ring.learning import (
@@ -228,7 +229,7 @@ def _of_others(image: np.ndarray, settings: DetectorSettings) -> Iterator[str]:
 
 def _of_mirrored(image: np.ndarray, settings: DetectorSettings) -> str:
     """Return how many square markers are mirrored, which makes others of them or none."""
-    squares = [name for name in settings.families if name in SQUARE_NAMES]
+    squares = [it for it in settings.families if it in SQUARE_NAMES and has_dictionary(it)]
     if not squares:
         return ''
     flipped = np.ascontiguousarray(image[:, ::-1])

@@ -173,8 +173,8 @@ RING = [
     ),
     Gate('words in another shape', 'detectors.ring.contests:_ODD', '1.0'),
     Gate('dots on bands', 'detectors.ring.contests:on_targets', _ON_DOT),
-    Gate('bands that overlap', 'detectors.ring.contests:_ON_TOP', '0.0'),
-    Gate('two claims to an ID or a dot', 'detectors.ring.contests:_CLEARLY', '0.0'),
+    Gate('two claims to an ID, or bands that overlap', 'detectors.ring.contests:_SURER', '0.0'),
+    Gate('two claims to a dot', 'detectors.ring.contests:_CLEARLY', '0.0'),
 ]
 
 GSI = [

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
@@ -20,7 +21,7 @@ from ahf_ros.orientation.points import correlations, standard_deviations
 from ahf_ros.text import reason_of, shown
 
 BROWN = ('', 'plumb_bob', 'rational_polynomial')
-"""Names of Brown's model; the last one is read only without a denominator."""
+"""Names of Brown's model; the last one has more coefficients, which it stands for."""
 
 FISHEYE = ('equidistant', 'fisheye')
 """Names of the model of Kannala and Brandt."""
@@ -31,6 +32,9 @@ _MORE = (
     (slice(5, 8), 'the rational model'),
 )
 """What further coefficients of OpenCV are for."""
+
+_FOLLOWED = 0.1  # px, by which Brown's model may differ from that of more coefficients
+_COLUMNS, _ROWS = 33, 25  # of places in an image at which they are compared
 
 _KALIBR = {'radtan': 'plumb_bob', 'none': '', 'equidistant': 'equidistant'}
 """Kalibr's models of distortion, as ROS calls them."""
@@ -76,7 +80,9 @@ class CameraFile:
 def read_camera(path: str | Path) -> CameraFile:
     """Return the calibration in a file of ROS (camera_info), OpenCV (FileStorage) or Kalibr.
 
-    A ValueError names the file, and the field that is missing, damaged or of another model.
+    Brown's coefficients stand for OpenCV's rational model, a thin prism or a tilted sensor, as far
+    as these agree. A ValueError names the file, and the field that is missing, damaged or of
+    another model.
     """
     content = _without_kalibr(_parsed(read_text(path), str(path)), path)
     width, height = (_whole(content, name, path) for name in ('width', 'height'))
@@ -101,12 +107,13 @@ def read_camera(path: str | Path) -> CameraFile:
             f'{path}: distortion_coefficients are {distortion}, accepted of an equidistant lens '
             'are 4 numbers: k1, k2, k3, k4'
         )
-    if len(distortion) not in (0, 4, 5, 8, 12, 14) or any(distortion[5:]):
-        more = next((it for place, it in _MORE if any(distortion[place])), 'another model')
+    if model not in FISHEYE and len(distortion) not in (0, 4, 5, 8, 12, 14):
         raise ValueError(
-            f'{path}: distortion_coefficients are {distortion}, those of {more}; accepted are 4 '
-            'or 5 numbers: k1, k2, p1, p2, k3'
+            f'{path}: distortion_coefficients are {distortion}, accepted are 4 or 5 numbers: k1, '
+            'k2, p1, p2, k3; or 8, 12 or 14, as OpenCV orders them'
         )
+    if any(distortion[5:]):
+        distortion = _as_brown(np.reshape(matrix, (3, 3)), distortion, width, height, path)
     fisheye = model in FISHEYE
     names = EQUIDISTANT if fisheye else PARAMETERS
     coefficients = _OF_FISHEYE if fisheye else _COEFFICIENTS
@@ -116,6 +123,44 @@ def read_camera(path: str | Path) -> CameraFile:
     name = content.get('camera_name') or Path(path).stem
     calibration = np.array([value[it] for it in names])
     return CameraFile(str(path), str(name), width, height, calibration, fisheye)
+
+
+def _as_brown(
+    matrix: FloatArray, distortion: list[float], width: int, height: int, path: str | Path
+) -> list[float]:
+    """Return Brown's coefficients that distort an image most as those of another model do, (5,).
+
+    Distorted places are linear in them. A ValueError says by how much they differ, if they do.
+    """
+    across, down = np.linspace(0, width - 1, _COLUMNS), np.linspace(0, height - 1, _ROWS)
+    places = np.stack(np.meshgrid(across, down), axis=-1).reshape(-1, 2)
+    inverse = np.linalg.inv(matrix)
+    points = np.column_stack([places, np.ones(len(places))]) @ inverse.T
+    lens = np.zeros(3), np.zeros(3), matrix, np.array(distortion)
+    before = np.inf
+    while True:
+        imaged = cv2.projectPoints(points, *lens)[0][:, 0]
+        off = np.linalg.norm(imaged - places, axis=1).max()
+        if off < _FOLLOWED or not off < before:
+            break
+        before = off
+        points[:, :2] -= (imaged - places) @ inverse[:2, :2].T
+    coefficients = np.zeros(len(_COEFFICIENTS))
+    if off < _FOLLOWED:
+        ideal = points[:, :2].T
+        moved = (inverse @ np.column_stack([imaged, points[:, 2]]).T)[:2] - ideal
+        (x, y), r = ideal, (ideal**2).sum(axis=0)
+        tangential = [np.stack([2 * x * y, r + 2 * y**2]), np.stack([r + 2 * x**2, 2 * x * y])]
+        basis = np.stack([ideal * r, ideal * r**2, *tangential, ideal * r**3], axis=-1)
+        coefficients = np.linalg.lstsq(basis.reshape(-1, 5), moved.ravel(), rcond=None)[0]
+        off = matrix[0, 0] * np.linalg.norm(basis @ coefficients - moved, axis=0).max()
+    if not off < _FOLLOWED:
+        more = next(it for place, it in _MORE if any(distortion[place]))
+        raise ValueError(
+            f'{path}: distortion_coefficients are {distortion}, those of {more}, from which k1, '
+            f'k2, p1, p2, k3 differ by {off:.2g} px, accepted is less than {_FOLLOWED} px'
+        )
+    return [float(it) for it in coefficients]
 
 
 def ros_yaml(view: CameraView, calibration: FloatArray, covariance: FloatArray) -> bytes:

@@ -19,6 +19,7 @@ from ahf_ros.interchange.exif import Exif, read_exif
 from ahf_ros.interchange.network_files import CameraKnowledge, make_network, read_cameras
 from ahf_ros.interchange.observation_files import ObservedPhotograph, read_observations
 from ahf_ros.interchange.target_json import to_json
+from ahf_ros.orientation.camera import project
 from ahf_ros.orientation.network import CameraView, Network
 from ahf_ros.target import Identification, Target
 from support.networks import CALIBRATION
@@ -292,14 +293,34 @@ def test_bad_calibrations_are_refused(tmp_path: Path, text: str, message: str) -
     assert 'camera.yaml' in str(caught.value)
 
 
+@pytest.mark.parametrize('more', [[], [1e-5, 0.0, -2e-5, 0.0]])
+def test_browns_model_stands_for_more_coefficients(tmp_path: Path, more: list[float]) -> None:
+    path = tmp_path / 'camera.yaml'
+    distortion = [0.42, 0.1, 3e-4, -2e-4, 0.0, 0.5, 0.1, 0.0, *more]
+    matrix = np.array([[3000, 0, 2010.5], [0, 3000, 1492.5], [0, 0, 1]])
+    data = f'K: {matrix.tolist()}\nD: {distortion}'
+    path.write_text(f'image_width: 4000\nimage_height: 3000\n{data}\n')
+    lens = read_camera(path).calibration
+    points = np.array([[0.0, 0.0, 1], [-0.5, 0.3, 1], [0.66, 0.49, 1]])
+    seen = cv2.projectPoints(points, np.zeros(3), np.zeros(3), matrix, np.array(distortion))[0][
+        :, 0
+    ]
+    turned = np.tile(np.eye(3), (3, 1, 1))
+    ours = project(np.tile(lens, (3, 1)), turned, np.zeros((3, 3)), points)
+    assert np.abs(ours - seen).max() < 0.1
+
+
 @pytest.mark.parametrize(
     ('more', 'message'),
     [
         ('distortion_model: omni', "distortion_model is 'omni'"),
         ('distortion_model: equidistant\nD: [1, 2, 3]', 'are 4 numbers: k1, k2, k3, k4'),
         ('D: [1, 2, 3]', r'accepted are 4 or 5 numbers'),
-        ('D: [1, 2, 3, 4, 5, 6, 7, 8]', r'of the rational model; accepted are 4 or 5 numbers'),
-        ('D: [1, 2, 3, 4, 5, 0, 0, 0, 1, 0, 0, 0]', r'of a thin prism; accepted are 4'),
+        (
+            'D: [1, 2, 3, 4, 5, 6, 7, 8]',
+            r'of the rational model, from which k1, k2',
+        ),
+        ('D: [1, 2, 3, 4, 5, 0, 0, 0, 1, 0, 0, 0]', r'of a thin prism, from which k1'),
     ],
 )
 def test_other_lenses_are_refused(tmp_path: Path, more: str, message: str) -> None:
