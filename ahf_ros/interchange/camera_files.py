@@ -15,7 +15,12 @@ from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
 
 from ahf_ros.interchange.files import read_text
-from ahf_ros.orientation.camera import EQUIDISTANT, PARAMETERS, parameters_of
+from ahf_ros.orientation.camera import (
+    EQUIDISTANT,
+    PARAMETERS,
+    distortion_by_coefficient,
+    parameters_of,
+)
 from ahf_ros.orientation.network import CameraView, FloatArray
 from ahf_ros.orientation.points import correlations, standard_deviations
 from ahf_ros.text import reason_of, shown
@@ -145,22 +150,20 @@ def _as_brown(
             break
         before = off
         points[:, :2] -= (imaged - places) @ inverse[:2, :2].T
-    coefficients = np.zeros(len(_COEFFICIENTS))
+    ideal, coefficients = points[:, :2], np.zeros(len(_COEFFICIENTS))
     if off < _FOLLOWED:
-        ideal = points[:, :2].T
-        moved = (inverse @ np.column_stack([imaged, points[:, 2]]).T)[:2] - ideal
-        (x, y), r = ideal, (ideal**2).sum(axis=0)
-        tangential = [np.stack([2 * x * y, r + 2 * y**2]), np.stack([r + 2 * x**2, 2 * x * y])]
-        basis = np.stack([ideal * r, ideal * r**2, *tangential, ideal * r**3], axis=-1)
-        coefficients = np.linalg.lstsq(basis.reshape(-1, 5), moved.ravel(), rcond=None)[0]
-        off = matrix[0, 0] * np.linalg.norm(basis @ coefficients - moved, axis=0).max()
+        moved = (np.column_stack([imaged, points[:, 2]]) @ inverse.T)[:, :2] - ideal
+        basis = distortion_by_coefficient(ideal)
+        coefficients = np.linalg.lstsq(basis.reshape(moved.size, -1), moved.ravel(), rcond=None)[0]
+        off = matrix[0, 0] * np.linalg.norm(basis @ coefficients - moved, axis=1).max()
     if not off < _FOLLOWED:
         more = next(it for place, it in _MORE if any(distortion[place]))
         raise ValueError(
             f'{path}: distortion_coefficients are {distortion}, those of {more}, from which k1, '
             f'k2, p1, p2, k3 differ by {off:.2g} px, accepted is less than {_FOLLOWED} px'
         )
-    return [float(it) for it in coefficients]
+    value = dict(zip(PARAMETERS[3:8], coefficients.tolist(), strict=True))
+    return [value[name] for name in _COEFFICIENTS]
 
 
 def ros_yaml(view: CameraView, calibration: FloatArray, covariance: FloatArray) -> bytes:

@@ -163,7 +163,7 @@ def linearise(
     sensor = _sensor(calibration)
 
     by_calibration = np.zeros((len(points), 2, len(PARAMETERS)))
-    by_calibration[:, :, 3:8] = sign * sensor @ _distortion_by_coefficient(place, equidistant)
+    by_calibration[:, :, 3:8] = sign * sensor @ distortion_by_coefficient(place, equidistant)
     outer = [0, 1, 2, 8, 9]
     by_calibration[:, :, outer] = _sensor_by_parameter(calibration, distorted)
     by_ideal = sensor
@@ -317,8 +317,12 @@ def _distortion_by_place(
     return np.where(np.reshape(equidistant, (-1, 1, 1)), fisheye - np.eye(2), derivative)
 
 
-def _distortion_by_coefficient(place: FloatArray, equidistant: Fisheye) -> FloatArray:
-    """Return the derivatives (n, 2, 5) of the distortion by k1, k2, k3, p1 and p2."""
+def distortion_by_coefficient(place: FloatArray, equidistant: Fisheye = False) -> FloatArray:
+    """Return the derivatives (n, 2, 5) of the distortion by k1, k2, k3, p1 and p2.
+
+    Brown's distortion at places (n, 2) of the plane z = 1 is linear in its coefficients. Those of
+    an equidistant lens are k1, k2, k3 and k4.
+    """
     x, y = place.T
     r2 = x**2 + y**2
     derivative = np.empty((len(place), 2, 5))
