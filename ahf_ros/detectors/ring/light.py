@@ -38,19 +38,39 @@ def predicted_light(
     radii: np.ndarray,
     band: Radii,
     circles: tuple[Radii, ...] = (),
+    framed: np.ndarray | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the gray values that paper has at points of bands, and how far they are known.
 
-    The points are at angles (m,), rad, and radii (d,) of targets with frames (k, 3, 3), in which
+    Some targets may be `framed`, shape (k,): their ground is the gap alone. The points are at angles (m,), rad, and radii (d,) of targets with frames (k, 3, 3), in which
     black is lifted to gray values (k,); `circles` are no ground. The second array is the standard
     deviation of the logarithm of the first, infinite where no ground predicts it; both are
     float32, (k, m, d).
     """
-    points, ground, candidates, order = _geometry(band, circles)
+    shape = len(frames), len(angles), len(radii)
+    light, spread = np.empty(shape, np.float32), np.empty(shape, np.float32)
+    ends = np.zeros(len(frames), bool) if framed is None else framed
+    for in_frame in np.unique(ends):
+        some = np.flatnonzero(ends == in_frame)
+        geometry = _geometry(band, circles, bool(in_frame))
+        light[some], spread[some] = _predicted(
+            gray, frames[some], lift[some], geometry, _places(band[1] + _MARGIN, angles, radii)
+        )
+    return light, spread
+
+
+def _predicted(
+    gray: np.ndarray,
+    frames: np.ndarray,
+    lift: np.ndarray,
+    geometry: tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray],
+    place: tuple[np.ndarray, np.ndarray, np.ndarray],
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return what `predicted_light` does, for targets with the same ground."""
+    points, ground, candidates, order = geometry
     seen = np.fft.rfft2(ground, (_TRANSFORM,) * 2)
     overlap = np.fft.irfft2(np.abs(seen) ** 2, (_TRANSFORM,) * 2).ravel()[candidates]
-    place = _places(band[1] + _MARGIN, angles, radii)
-    shape = len(frames), len(angles), len(radii)
+    shape = len(frames), *place[0].shape
     light, spread = np.empty(shape, np.float32), np.empty(shape, np.float32)
     for start in range(0, len(frames), _PART):
         part = slice(start, start + _PART)
@@ -86,7 +106,7 @@ def predicted_light(
 
 @lru_cache(maxsize=16)
 def _geometry(
-    band: Radii, circles: tuple[Radii, ...]
+    band: Radii, circles: tuple[Radii, ...], framed: bool
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Return the cells of a rectified target, its ground, the shifts compared, and their order.
 
@@ -97,7 +117,9 @@ def _geometry(
     along = (np.arange(_CELLS) - (_CELLS - 1) / 2) * (2 * reach / _CELLS)
     points = np.stack(np.meshgrid(along, along), axis=-1)
     radii = np.hypot(*np.moveaxis(points, 2, 0))
-    ground = ((radii > 1 + _ASIDE) & (radii < inner - _ASIDE)) | (radii > outer + _ASIDE)
+    ground = (radii > 1 + _ASIDE) & (radii < inner - _ASIDE)
+    if not framed:
+        ground |= radii > outer + _ASIDE
     ground &= clear_of(radii, circles, _ASIDE)
     whole = ground.astype(np.float32)
     seen = np.fft.rfft2(whole, (_TRANSFORM,) * 2)

@@ -53,9 +53,7 @@ _LIGHT = 0.34  # share of the ground that is darker, or has edges, from which th
 _GLARE_EDGES = 0.03  # share of the ground, more than edges of glare have
 _WHITE_OUT = 0.6  # share of the ground that is saturated, from which that is no glare
 _ASIDE = 0.15  # least distance from the band at which its ground may end, dot radii
-_STRAY = 0.03  # share of readings that are bright in a gap that is dark
-_WHITE = 0.7  # share of the step of ink, in ln, from which what ends the ground is white
-_FRAMED = 0.5  # share of directions, from which the ground ends in what is as bright as ink
+_WHITE = 0.5  # share of the step of ink, in ln, from which what ends the ground is white
 _NO_GLARE = 256.0  # more than any gray value
 
 
@@ -85,6 +83,8 @@ class PolarImages(ArrayRecord):
         Of edges, standard deviation in px.
     noise : ndarray of float64, shape (k,)
         Of gray values.
+    framed : ndarray of bool, shape (k,)
+        Whether dark ground ends beside the band, on white paper.
     shade, glare : ndarray of float32, shape (k,)
         Gray values of ground up to which something covers it, and from which glare lies on it;
         infinite where white is paper.
@@ -100,6 +100,7 @@ class PolarImages(ArrayRecord):
     size: np.ndarray
     blur: np.ndarray
     noise: np.ndarray
+    framed: np.ndarray
     shade: np.ndarray
     glare: np.ndarray
 
@@ -207,6 +208,7 @@ def polar_images(
         size=dots.size,
         blur=dots.blur,
         noise=noise,
+        framed=np.zeros(len(values), bool),
         shade=shade,
         glare=glare,
     )
@@ -312,32 +314,32 @@ def on_dark_ground(
 ) -> PolarImages:
     """Return polar images in which some bright targets reach as far as the dark ground about them.
 
-    Where the gap is dark all around and most directions are as bright as ink beyond the band, the
-    ground ends there: it was a square that is little larger than the band, on white paper.
+    Where most directions beyond the band are brighter than the gap, by as much as ink is, the
+    ground ends there: it was a disc or a square that is little larger than the band, on white
+    paper. In every direction it ends where it first becomes as bright, whatever the light is.
     """
     inner, outer = band
     bright = np.flatnonzero((polar.polarity < 0) & which)
     if not bright.size:
         return polar
     some = polar.select(bright)
-    gap = some.at(np.tile(1 + (inner - 1) * GAP, (len(bright), 1)).T).swapaxes(0, 1)
-    gap = gap.reshape(len(bright), -1)
-    usual = medians(gap)
-    limit, as_ink = usual / np.sqrt(some.contrast), usual / some.contrast**_WHITE
-    farthest = some.gray[some.row, :, -1]
-    framed = (gap < limit[:, None]).mean(axis=1) > 1 - _STRAY
-    framed &= (farthest >= as_ink[:, None]).mean(axis=1) > _FRAMED
+    gap = some.at(np.tile(1 + (inner - 1) * GAP, (len(bright), 1)).T).mean(axis=0)
+    brighter = some.levels(some.gray[some.row, :, -1]) - some.levels(gap)
+    framed = medians(brighter) > -_WHITE * np.log(some.contrast)
     if not framed.any():
         return polar
-    bright, some, limit = bright[framed], some.select(framed), limit[framed, None, None]
+    bright, some = bright[framed], some.select(framed)
     aside = (SOFT_EDGE * some.blur / some.size)[:, None]
     beyond = some.radii >= outer + np.maximum(aside, _ASIDE)
-    white = (some.gray[some.row] >= limit) & beyond[:, None]
+    values = np.where(beyond[:, None], some.gray[some.row], np.inf)
+    darkest = np.minimum.accumulate(values, axis=2)
+    white = beyond[:, None] & (values * np.sqrt(some.contrast)[:, None, None] > darkest)
     first = np.take_along_axis(some.radii, white.argmax(axis=2), axis=1)
     until = np.where(white.any(axis=2), np.maximum(first - aside, outer), np.inf)
-    reach = polar.reach.copy()
+    reach, ends = polar.reach.copy(), polar.framed.copy()
     reach[bright] = np.minimum(reach[bright], until)
-    return replace(polar, reach=reach)
+    ends[bright] = True
+    return replace(polar, reach=reach, framed=ends)
 
 
 def _along(of_targets: np.ndarray, values: np.ndarray) -> np.ndarray:

@@ -49,7 +49,7 @@ from ahf_ros.imaging.black import lifted
 PER_SECTOR = 10
 """Angles of a sector at which bands are read."""
 
-_IN_PLACE = 0.75  # share of the edges of a target whose ground may end
+_IN_PLACE = 0.5  # share of the edges of a target whose ground may end
 _PROPORTION = 0.06  # by which bands may be larger or smaller beside their dots than printed
 _THIN = 1.5  # width of a band, in deviations of blur, up to which its dot alone is measured
 _SHIFTS = np.arange(-2.4, 2.41, 0.4)  # of edges, that are tried, px
@@ -190,7 +190,9 @@ def _settled(
     levels = np.maximum(sample_circles(gray, targets.frames, angles, radii), 0)
     levels = lifted(levels, polar.lift.astype(np.float32)[:, None, None])
     printed = family.band, family.circles
-    light = predicted_light(gray, targets.frames, polar.lift, angles, radii, *printed)
+    light = predicted_light(
+        gray, targets.frames, polar.lift, angles, radii, *printed, polar.framed
+    )
     growth = growth[some]
     of_levels = level_evidence(polar, levels, *light, radii, growth, family.band, SHARES)
     evidence = edges.plus(of_levels)
