@@ -309,9 +309,7 @@ def _reach(
     return reach
 
 
-def on_dark_ground(
-    polar: PolarImages, band: tuple[float, float], which: np.ndarray | bool = True
-) -> PolarImages:
+def on_dark_ground(polar: PolarImages, band: tuple[float, float]) -> PolarImages:
     """Return polar images in which some bright targets reach as far as the dark ground about them.
 
     Where most directions beyond the band are brighter than the gap, by as much as ink is, the
@@ -319,7 +317,7 @@ def on_dark_ground(
     paper. In every direction it ends where it first becomes as bright, whatever the light is.
     """
     inner, outer = band
-    bright = np.flatnonzero((polar.polarity < 0) & which)
+    bright = np.flatnonzero(polar.polarity < 0)
     if not bright.size:
         return polar
     some = polar.select(bright)
@@ -331,7 +329,7 @@ def on_dark_ground(
     bright, some = bright[framed], some.select(framed)
     aside = (SOFT_EDGE * some.blur / some.size)[:, None]
     beyond = some.radii >= outer + np.maximum(aside, _ASIDE)
-    values = np.where(beyond[:, None], some.gray[some.row], np.inf)
+    values = np.where(some.radii[:, None] > 1, some.gray[some.row], np.inf)
     darkest = np.minimum.accumulate(values, axis=2)
     white = beyond[:, None] & (values * np.sqrt(some.contrast)[:, None, None] > darkest)
     first = np.take_along_axis(some.radii, white.argmax(axis=2), axis=1)

@@ -49,7 +49,6 @@ from ahf_ros.imaging.black import lifted
 PER_SECTOR = 10
 """Angles of a sector at which bands are read."""
 
-_IN_PLACE = 0.5  # share of the edges of a target whose ground may end
 _PROPORTION = 0.06  # by which bands may be larger or smaller beside their dots than printed
 _THIN = 1.5  # width of a band, in deviations of blur, up to which its dot alone is measured
 _SHIFTS = np.arange(-2.4, 2.41, 0.4)  # of edges, that are tried, px
@@ -109,7 +108,7 @@ def _read_part(
     bands = replace(fit, frames=frame.scaled(fit.frames, np.where(printed, fit.proportion, 1)))
     growth = fit.polarity * fit.edge_shift / bands.size
     whole = polar_images(gray, bands, family.band, family.bits * PER_SECTOR)
-    polar = on_dark_ground(whole, family.band, fit.share > _IN_PLACE)
+    polar = on_dark_ground(whole, family.band)
     edges = edge_evidence(polar, np.ones(len(read)), growth, family.band, SHARES)
     words = decode(edges, _overhang(growth, family), family, prior.expected)
     # What is seen against anything is that of edges alone, whatever else there is.
