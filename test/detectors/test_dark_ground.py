@@ -1,12 +1,16 @@
-"""Bright ring targets on dark squares that end where the band does, on white paper."""
+"""Bright ring targets on dark squares and discs that end where the band does, on white paper."""
 
 from __future__ import annotations
 
 import cv2
 import numpy as np
+import pytest
 
 from ahf_ros.codes.ring import family
 from ahf_ros.detectors import create_detector
+from ahf_ros.evaluation import score
+from ahf_ros.synthetic.bent.picture import render_bent
+from benchmarks.bent import settings
 from support.ring import inked
 
 WHITE, BLACK = 0.7, 0.05  # reflectances
@@ -44,3 +48,15 @@ def test_targets_are_read_whose_dark_ground_ends() -> None:
     image, numbers = photograph(5)
     found = [target.id for target in create_detector(family='cct12')(image)]
     assert sorted(found) == numbers
+
+
+@pytest.mark.parametrize(
+    ('light', 'radius', 'least'), [('stripe 0.12', 6, 44), ('fine_stripe 0.12', 10, 46)]
+)
+def test_they_are_read_under_stripes(light: str, radius: int, least: int) -> None:
+    """Ink in the light is as bright as paper in shadow; 18 and 20 were read."""
+    picture = render_bent(settings('metashape12', 'bright', light, radius, 402, 54))
+    found = create_detector(family='metashape12')(picture.image)
+    seen = score(picture.targets, found)
+    assert seen.right >= least
+    assert seen.wrong == 0

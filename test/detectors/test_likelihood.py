@@ -61,7 +61,7 @@ def polar(
         size=np.array([size]),
         noise=np.array([1.2]),
         blur=np.array([0.7]),
-        framed=np.zeros(1, bool),
+        plate=np.full((1, 2), np.inf),
         shade=np.array([shade], np.float32),
         glare=np.array([glare], np.float32),
     )

@@ -24,9 +24,12 @@ _MAXIMUM_SHIFT = 3.6  # shift, dot radii
 _ASIDE = 0.18  # distance of ground from edges, dot radii
 _OVERLAP = 0.12  # share of the ground that a shift must compare
 _SHIFTS = 60  # best ones, that predict
+_SHADOW = 0.1  # share of a gap that is as dark as ink in shadow
 _ALIKE = 1.1  # ratio of differences of shifts that are as good as each other
 _UNKNOWN = 0.03  # weight of ground below which less than two of the shifts predict a point
 _ROUNDING = 1e-5  # square of ln by which whole gray values near 90 differ, without any noise
+
+_NO_MATCH = 1e6  # square of differences of shifts that compare too little
 _PART = 32  # targets at a time, whose transforms stay in the cache
 
 
@@ -38,53 +41,42 @@ def predicted_light(
     radii: np.ndarray,
     band: Radii,
     circles: tuple[Radii, ...] = (),
-    framed: np.ndarray | None = None,
+    plate: np.ndarray | None = None,
+    contrast: np.ndarray | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the gray values that paper has at points of bands, and how far they are known.
 
-    Some targets may be `framed`, shape (k,): their ground is the gap alone. The points are at angles (m,), rad, and radii (d,) of targets with frames (k, 3, 3), in which
-    black is lifted to gray values (k,); `circles` are no ground. The second array is the standard
-    deviation of the logarithm of the first, infinite where no ground predicts it; both are
-    float32, (k, m, d).
+    The points are at angles (m,), rad, and radii (d,) of targets with frames (k, 3, 3), in which
+    black is lifted to gray values (k,); `circles` are no ground. Where dark ground ends on white
+    paper, at the radii of a `plate`, shape (k, 2), see `PolarImages`, that paper is as bright as
+    the ground over its `contrast`, shape (k,). The second array is the standard deviation of the
+    logarithm of the first, infinite where no ground predicts it; both are float32, (k, m, d).
     """
+    points, ground, candidates, order = _geometry(band, circles)
+    place = _places(band[1] + _MARGIN, angles, radii)
     shape = len(frames), len(angles), len(radii)
-    light, spread = np.empty(shape, np.float32), np.empty(shape, np.float32)
-    ends = np.zeros(len(frames), bool) if framed is None else framed
-    for in_frame in np.unique(ends):
-        some = np.flatnonzero(ends == in_frame)
-        geometry = _geometry(band, circles, bool(in_frame))
-        light[some], spread[some] = _predicted(
-            gray, frames[some], lift[some], geometry, _places(band[1] + _MARGIN, angles, radii)
-        )
-    return light, spread
-
-
-def _predicted(
-    gray: np.ndarray,
-    frames: np.ndarray,
-    lift: np.ndarray,
-    geometry: tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray],
-    place: tuple[np.ndarray, np.ndarray, np.ndarray],
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return what `predicted_light` does, for targets with the same ground."""
-    points, ground, candidates, order = geometry
-    seen = np.fft.rfft2(ground, (_TRANSFORM,) * 2)
-    overlap = np.fft.irfft2(np.abs(seen) ** 2, (_TRANSFORM,) * 2).ravel()[candidates]
-    shape = len(frames), *place[0].shape
     light, spread = np.empty(shape, np.float32), np.empty(shape, np.float32)
     for start in range(0, len(frames), _PART):
         part = slice(start, start + _PART)
         values = np.maximum(sample(gray, frame.project(frames[part], points)), 0)
         values = lifted(values, lift[part].astype(np.float32)[:, None, None])
+        grounds = ground[None]
+        if plate is not None and contrast is not None and np.isfinite(plate[part]).any():
+            values, grounds = _as_dark(values, ground, points, band, plate[part], contrast[part])
+        seen = np.fft.rfft2(grounds, (_TRANSFORM,) * 2)
+        overlap = np.fft.irfft2(np.abs(seen) ** 2, (_TRANSFORM,) * 2)
+        overlap = overlap.reshape(len(grounds), -1)[:, candidates]
         logs = np.log(values + np.float32(LOG_OFFSET))
-        middle = (logs * ground).sum(axis=(1, 2), keepdims=True) / ground.sum()
-        logs = (logs - middle) * ground
+        whole = grounds.sum(axis=(1, 2), keepdims=True)
+        middle = (logs * grounds).sum(axis=(1, 2), keepdims=True) / whole
+        logs = (logs - middle) * grounds
         first, second = (np.fft.rfft2(of, (_TRANSFORM,) * 2) for of in (logs, logs * logs))
         # Of the squares of differences between ground and shifted ground.
         both = 2 * seen.conj() * second - 2 * np.abs(first) ** 2
         differ = np.fft.irfft2(both, (_TRANSFORM,) * 2)
         differ = (differ + _turned(differ)).reshape(len(logs), -1)[:, candidates] / 2
-        differ = np.maximum(differ / overlap, _ROUNDING) * order
+        differ = np.maximum(differ / np.maximum(overlap, 1), _ROUNDING) * order
+        differ[np.broadcast_to(overlap <= _OVERLAP * whole[:, 0], differ.shape)] = _NO_MATCH
         best = np.argpartition(differ, _SHIFTS, axis=1)[:, :_SHIFTS]
         of_best = np.take_along_axis(differ, best, axis=1)
         weight = 1 / (of_best + of_best.min(axis=1, keepdims=True) / 2)
@@ -104,9 +96,33 @@ def _predicted(
     return np.maximum(light, 0), spread
 
 
+def _as_dark(
+    values: np.ndarray,
+    ground: np.ndarray,
+    points: np.ndarray,
+    band: Radii,
+    plate: np.ndarray,
+    contrast: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return gray values with dark ground in place of white paper, and the ground, (k, n, n).
+
+    Ink of other targets on that paper is no ground; it is darker than ink in shadow would be if it
+    was paper.
+    """
+    inner, outer = band
+    radii = np.hypot(*np.moveaxis(points, 2, 0))
+    ends, begins = np.moveaxis(plate, 1, 0)[..., None, None]
+    step = contrast.astype(np.float32)[:, None, None]
+    on_paper = (radii > begins) & (radii < outer + _MARGIN)
+    gap = np.sort(values[:, (ground > 0) & (radii < inner)], axis=1)
+    shadow = gap[:, int(_SHADOW * gap.shape[1])][:, None, None]
+    paper = on_paper & (values * np.sqrt(step) > shadow)
+    return np.where(on_paper, values * step, values), ground * ((radii < ends) | paper)
+
+
 @lru_cache(maxsize=16)
 def _geometry(
-    band: Radii, circles: tuple[Radii, ...], framed: bool
+    band: Radii, circles: tuple[Radii, ...]
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Return the cells of a rectified target, its ground, the shifts compared, and their order.
 
@@ -117,9 +133,7 @@ def _geometry(
     along = (np.arange(_CELLS) - (_CELLS - 1) / 2) * (2 * reach / _CELLS)
     points = np.stack(np.meshgrid(along, along), axis=-1)
     radii = np.hypot(*np.moveaxis(points, 2, 0))
-    ground = (radii > 1 + _ASIDE) & (radii < inner - _ASIDE)
-    if not framed:
-        ground |= radii > outer + _ASIDE
+    ground = ((radii > 1 + _ASIDE) & (radii < inner - _ASIDE)) | (radii > outer + _ASIDE)
     ground &= clear_of(radii, circles, _ASIDE)
     whole = ground.astype(np.float32)
     seen = np.fft.rfft2(whole, (_TRANSFORM,) * 2)

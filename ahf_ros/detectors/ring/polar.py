@@ -83,8 +83,9 @@ class PolarImages(ArrayRecord):
         Of edges, standard deviation in px.
     noise : ndarray of float64, shape (k,)
         Of gray values.
-    framed : ndarray of bool, shape (k,)
-        Whether dark ground ends beside the band, on white paper.
+    plate : ndarray of float64, shape (k, 2)
+        Radii up to which ground is as dark as the gap, and from which on it is white paper, dot
+        radii; infinite where no paper is seen.
     shade, glare : ndarray of float32, shape (k,)
         Gray values of ground up to which something covers it, and from which glare lies on it;
         infinite where white is paper.
@@ -100,7 +101,7 @@ class PolarImages(ArrayRecord):
     size: np.ndarray
     blur: np.ndarray
     noise: np.ndarray
-    framed: np.ndarray
+    plate: np.ndarray
     shade: np.ndarray
     glare: np.ndarray
 
@@ -208,7 +209,7 @@ def polar_images(
         size=dots.size,
         blur=dots.blur,
         noise=noise,
-        framed=np.zeros(len(values), bool),
+        plate=np.full((len(values), 2), np.inf),
         shade=shade,
         glare=glare,
     )
@@ -309,35 +310,37 @@ def _reach(
     return reach
 
 
-def on_dark_ground(polar: PolarImages, band: tuple[float, float]) -> PolarImages:
+def on_dark_ground(
+    polar: PolarImages, band: tuple[float, float], which: np.ndarray | bool = True
+) -> PolarImages:
     """Return polar images in which some bright targets reach as far as the dark ground about them.
 
     Where most directions beyond the band are brighter than the gap, by as much as ink is, the
-    ground ends there: it was a disc or a square that is little larger than the band, on white
-    paper. In every direction it ends where it first becomes as bright, whatever the light is.
+    ground ends: it was a disc or a square that is little larger than the band, on white paper.
+    Light may change between two places, but not in most directions to the same side.
     """
     inner, outer = band
-    bright = np.flatnonzero(polar.polarity < 0)
+    bright = np.flatnonzero((polar.polarity < 0) & which)
     if not bright.size:
         return polar
     some = polar.select(bright)
     gap = some.at(np.tile(1 + (inner - 1) * GAP, (len(bright), 1)).T).mean(axis=0)
-    brighter = some.levels(some.gray[some.row, :, -1]) - some.levels(gap)
-    framed = medians(brighter) > -_WHITE * np.log(some.contrast)
-    if not framed.any():
+    steps = some.levels(some.gray[some.row]) - some.levels(gap)[..., None]
+    steps = steps.swapaxes(1, 2)
+    usual = medians(steps.reshape(-1, steps.shape[2])).reshape(steps.shape[:2])
+    aside = SOFT_EDGE * some.blur / some.size
+    dark = usual <= -_WHITE * np.log(some.contrast)[:, None]
+    dark |= some.radii < (outer + np.maximum(aside, _ASIDE))[:, None]
+    ends = np.flatnonzero(~dark[:, -1])
+    if not ends.size:
         return polar
-    bright, some = bright[framed], some.select(framed)
-    aside = (SOFT_EDGE * some.blur / some.size)[:, None]
-    beyond = some.radii >= outer + np.maximum(aside, _ASIDE)
-    values = np.where(some.radii[:, None] > 1, some.gray[some.row], np.inf)
-    darkest = np.minimum.accumulate(values, axis=2)
-    white = beyond[:, None] & (values * np.sqrt(some.contrast)[:, None, None] > darkest)
-    first = np.take_along_axis(some.radii, white.argmax(axis=2), axis=1)
-    until = np.where(white.any(axis=2), np.maximum(first - aside, outer), np.inf)
-    reach, ends = polar.reach.copy(), polar.framed.copy()
-    reach[bright] = np.minimum(reach[bright], until)
-    ends[bright] = True
-    return replace(polar, reach=reach, framed=ends)
+    bright, aside, radii = bright[ends], aside[ends], some.radii[ends]
+    first = radii.shape[1] - dark[ends, ::-1].argmax(axis=1)
+    end = radii[np.arange(len(ends)), first]
+    plate, reach = polar.plate.copy(), polar.reach.copy()
+    plate[bright] = np.stack([np.maximum(end - aside, outer), end + aside / 2], axis=1)
+    reach[bright] = np.minimum(reach[bright], plate[bright, :1])
+    return replace(polar, plate=plate, reach=reach)
 
 
 def _along(of_targets: np.ndarray, values: np.ndarray) -> np.ndarray:

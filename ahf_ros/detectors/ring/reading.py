@@ -42,7 +42,7 @@ from ahf_ros.detectors.ring.polar import (
     polar_images,
 )
 from ahf_ros.features import frame
-from ahf_ros.features.circle_fit import Fit, fit_circles
+from ahf_ros.features.circle_fit import ENOUGH, Fit, fit_circles
 from ahf_ros.features.sampling import sample_circles
 from ahf_ros.imaging.black import lifted
 
@@ -108,7 +108,7 @@ def _read_part(
     bands = replace(fit, frames=frame.scaled(fit.frames, np.where(printed, fit.proportion, 1)))
     growth = fit.polarity * fit.edge_shift / bands.size
     whole = polar_images(gray, bands, family.band, family.bits * PER_SECTOR)
-    polar = on_dark_ground(whole, family.band)
+    polar = on_dark_ground(whole, family.band, fit.share >= ENOUGH)
     edges = edge_evidence(polar, np.ones(len(read)), growth, family.band, SHARES)
     words = decode(edges, _overhang(growth, family), family, prior.expected)
     # What is seen against anything is that of edges alone, whatever else there is.
@@ -188,12 +188,11 @@ def _settled(
     angles = angles_of(family.bits * PER_SECTOR)
     levels = np.maximum(sample_circles(gray, targets.frames, angles, radii), 0)
     levels = lifted(levels, polar.lift.astype(np.float32)[:, None, None])
-    printed = family.band, family.circles
-    light = predicted_light(
-        gray, targets.frames, polar.lift, angles, radii, *printed, polar.framed
-    )
+    of_target = targets.frames, polar.lift, angles, radii
+    of_print = family.band, family.circles, polar.plate, polar.contrast
+    light, spread = predicted_light(gray, *of_target, *of_print)
     growth = growth[some]
-    of_levels = level_evidence(polar, levels, *light, radii, growth, family.band, SHARES)
+    of_levels = level_evidence(polar, levels, light, spread, radii, growth, family.band, SHARES)
     evidence = edges.plus(of_levels)
     overhang = _overhang(growth, family)
     of_all = decode(evidence, overhang, family, expected, arcs=last, looks=last)
