@@ -215,11 +215,11 @@ def told_table(seeds: Sequence[int], runs: int) -> list[str]:
                 [*seeds, len(kind), count, sigma > 0, round(1e6 * real), run]
             )
             network, truth = simulate(Field(12, 40), random)
-            start = approximate(truth, random, 0.005)
-            alone = adjust(network, start).measured_points
+            images = adjust(network, approximate(truth, random, 0.005))
+            alone = images.measured_points
             told, wrong, size = _told(kind, count, (sigma, real), truth, alone, random)
             network = replace(network, **told)
-            solution = adjust(network, start)
+            solution = adjust(network, images.start)
             clear = [it.name for it in solution.suspects if not it.rivals]
             either = {name for it in solution.suspects for name in (it.name, *it.rivals)}
             found.append(
