@@ -271,8 +271,7 @@ def _separation(network: Network, truth: Start, alone: MeasuredPoints, added: fl
     for other in range(1, len(closures.names)):
         kept = np.delete(np.arange(len(closures.names)), other)
         some = error[np.isin(closures.group, kept)]
-        weighed = closures.weighed(kept, np.full(len(closures.names), added))
-        left.append(some @ weighed.residual @ some)
+        left.append(closures.weights(kept, kept).whole(some, added))
     return float(np.sqrt(min(left)))
 
 

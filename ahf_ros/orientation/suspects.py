@@ -48,7 +48,7 @@ _DECISIVE = 2 * np.log(20)  # chi-square by which one is to blame rather than an
 _UNLIKELY = 1 / 21  # probability of what is given where it is not believed: odds of 20
 _GIVEN = 30  # times as likely, before tests, as any other standard deviation but for a factor of 2
 _CHECKED = 1e-6  # share of a variance that others must leave for something to be tested
-_RANK = 1e-9  # of eigenvalues, relative to the largest
+_RANK = 3e-5  # of singular values, relative to the largest
 _HALVINGS = 40
 _TINY = float(np.finfo(float).tiny)
 _LEAST = 1e-12  # probability that is said
@@ -135,13 +135,28 @@ def _shares(misfits: FloatArray) -> FloatArray:
     return shares
 
 
-class _Weighed(NamedTuple):
-    """The groups of rows, their P, its rank, and minus the log of its pseudo-determinant."""
+@dataclass(frozen=True)
+class Weights:
+    """P of rows, for any standard deviation that some of them have beside the given.
+
+    With its square s, P is W diag(1 / (1 + s d)) W', of `factors` W (r, m) and `sizes` d (m,).
+    `group` (r,) has the groups of rows, `determinant` minus the log of P's pseudo-determinant for
+    s = 0, but for a constant.
+    """
 
     group: IntArray
-    residual: FloatArray
-    redundancy: int
+    factors: FloatArray
+    sizes: FloatArray
     determinant: float
+
+    @property
+    def redundancy(self) -> int:
+        """Rank of P."""
+        return len(self.sizes)
+
+    def whole(self, gaps: FloatArray, variance: float) -> float:
+        """Return the statistic l' P l of gaps l (r,)."""
+        return float(((gaps @ self.factors) ** 2 / (1 + variance * self.sizes)).sum())
 
 
 @dataclass(frozen=True)
@@ -166,21 +181,19 @@ class Misclosures:
         free = rows @ movements(points)
         return cls(tuple(names), group, gaps, free, given, rows @ covariance @ rows.T)
 
-    def weighed(self, kept: IntArray, added: FloatArray) -> _Weighed:
-        """Return P of the rows that are kept, whose variances are larger by `added` (groups,)."""
+    def weights(self, kept: IntArray, common: IntArray = _NONE) -> Weights:
+        """Return P of kept groups, of which those in `common` may be less precise than given."""
         rows = np.isin(self.group, kept)
         free, group = self.free[rows], self.group[rows]
-        covariance = self.measured[np.ix_(rows, rows)] + np.diag(self.given[rows] + added[group])
-        # What similarities change may have any variance: no test sees it (Rao 1973, 4i.4).
-        size = np.trace(covariance) / max(float((free**2).sum()), _TINY)
-        covariance += size * free @ free.T
-        weight = np.linalg.inv(covariance)
-        normal = free.T @ weight @ free
-        sizes, axes = np.linalg.eigh(normal)
-        able = sizes > _RANK * sizes[-1]
-        half = weight @ free @ (axes[:, able] / np.sqrt(sizes[able]))
-        determinant = float(np.linalg.slogdet(covariance)[1] + np.log(sizes[able]).sum())
-        return _Weighed(group, weight - half @ half.T, int(rows.sum() - able.sum()), determinant)
+        basis, sizes, _ = np.linalg.svd(free)
+        contrasts = basis[:, int((sizes > _RANK * sizes[0]).sum()) :]  # no similarity changes them
+        covariance = self.measured[np.ix_(rows, rows)] + np.diag(self.given[rows])
+        factor = np.linalg.cholesky(contrasts.T @ covariance @ contrasts)
+        factors = np.linalg.solve(factor, contrasts.T).T
+        inside = factors[np.isin(group, common)]
+        added, axes = np.linalg.eigh(inside.T @ inside)
+        determinant = 2 * float(np.log(np.diag(factor)).sum())
+        return Weights(group, factors @ axes, np.maximum(added, 0), determinant)
 
     def tested(self, kept: IntArray, common: IntArray = _NONE) -> _Tested:
         """Return the tests of kept groups, where those in `common` may be less precise than given.
@@ -193,49 +206,48 @@ class Misclosures:
             smallest = np.sqrt(np.diag(self.measured).mean()) / 4
             most = max(float(np.abs(self.gaps).max()) / smallest, 2.0)
             sigmas = np.r_[0, smallest * 2 ** np.arange(np.ceil(np.log2(most)) + 1)]
-        columns = [self._tested(kept, common, sigma) for sigma in sigmas]
-        statistics, freedom, gaps, determinants, misfits = map(
+        weights, gaps = self.weights(kept, common), self.gaps[np.isin(self.group, kept)]
+        columns = [_tested(weights, gaps, kept, sigma**2) for sigma in sigmas]
+        statistics, freedom, differences, determinants, misfits = map(
             np.array, zip(*columns, strict=True)
         )
         misfits[1:] += 2 * np.log(_GIVEN)
-        return _Tested(statistics, freedom, gaps, determinants, misfits)
-
-    def _tested(
-        self, kept: IntArray, common: IntArray, sigma: float
-    ) -> tuple[FloatArray, IntArray, FloatArray, FloatArray, float]:
-        """Return a row of all that tests know, for one standard deviation."""
-        added = np.zeros(len(self.names))
-        added[common] = sigma**2
-        group, residual, _, determinant = self.weighed(kept, added)
-        gaps = self.gaps[np.isin(self.group, kept)]
-        pulls = residual @ gaps
-        statistics, freedom = np.zeros(len(kept)), np.zeros(len(kept), int)
-        differences, determinants = np.zeros(len(kept)), np.zeros(len(kept))
-        for place, number in enumerate(kept):
-            own = group == number
-            sizes, axes = np.linalg.eigh(residual[np.ix_(own, own)])
-            checked = sizes > _CHECKED * np.abs(residual).max()
-            along = (axes.T @ pulls[own])[checked]
-            statistics[place] = float((along**2 / sizes[checked]).sum())
-            differences[place] = float(np.linalg.norm(along / sizes[checked]))
-            freedom[place] = int(checked.sum())
-            determinants[place] = np.log(sizes[checked]).sum()
-        return statistics, freedom, differences, determinants, float(gaps @ pulls) + determinant
+        return _Tested(statistics, freedom, differences, determinants, misfits)
 
     def agreeing(self, kept: IntArray, blamed: IntArray) -> float:
         """Return the standard deviation, beside the given one, at which kept groups agree.
 
         That of blamed groups grows until the statistic of all is their redundancy.
         """
-        gaps = self.gaps[np.isin(self.group, kept)]
-        added = np.zeros(len(self.names))
+        weights, gaps = self.weights(kept, blamed), self.gaps[np.isin(self.group, kept)]
         low, high = 0.0, 2 * float(np.abs(self.gaps).max())
         for _ in range(_HALVINGS):
             middle = (low + high) / 2
-            added[blamed] = middle**2
-            _, residual, redundancy, _ = self.weighed(kept, added)
-            low, high = (middle, high) if gaps @ residual @ gaps > redundancy else (low, middle)
+            agree = weights.whole(gaps, middle**2) <= weights.redundancy
+            low, high = (low, middle) if agree else (middle, high)
         return high
+
+
+def _tested(
+    weights: Weights, gaps: FloatArray, groups: IntArray, variance: float
+) -> tuple[FloatArray, IntArray, FloatArray, FloatArray, float]:
+    """Return a row of all that tests know, for one variance beside the given."""
+    scaled = weights.factors / (1 + variance * weights.sizes)
+    pulls = scaled @ (weights.factors.T @ gaps)
+    largest = (scaled * weights.factors).sum(axis=1).max()
+    statistics, freedom = np.zeros(len(groups)), np.zeros(len(groups), int)
+    differences, determinants = np.zeros(len(groups)), np.zeros(len(groups))
+    for place, number in enumerate(groups):
+        own = weights.group == number
+        sizes, axes = np.linalg.eigh(scaled[own] @ weights.factors[own].T)
+        checked = sizes > _CHECKED * largest
+        along = (axes.T @ pulls[own])[checked]
+        statistics[place] = float((along**2 / sizes[checked]).sum())
+        differences[place] = float(np.linalg.norm(along / sizes[checked]))
+        freedom[place] = int(checked.sum())
+        determinants[place] = np.log(sizes[checked]).sum()
+    determinant = weights.determinant + float(np.log1p(variance * weights.sizes).sum())
+    return statistics, freedom, differences, determinants, float(gaps @ pulls) + determinant
 
 
 @dataclass
@@ -263,7 +275,7 @@ def examined(
     used = np.flatnonzero(~told)
     if not len(used):
         return Examined(network, (), ())
-    redundancy = closures.weighed(used, np.zeros(len(told))).redundancy
+    redundancy = closures.weights(used).redundancy
     if not redundancy:
         return Examined(network, (), () if told.any() else (_unchecked(closures, used),))
     found = _found(closures, used)
