@@ -285,7 +285,7 @@ def examined(
         if all(it.name in ours and not it.rivals for it in heard.suspects):
             found = heard
     warnings = _words(network, closures, found, keep)
-    if not (found.suspects or told.any()):
+    if not (found.suspects or len(found.blamed) or told.any()):
         warnings += _inseparable(closures, used, redundancy)
     if keep:
         kept = tuple(

@@ -67,3 +67,10 @@ def test_no_good_point_is_named(surveyed):
         for seed in range(40)
     )
     assert named == 0
+
+
+def test_four_points_that_contradict_the_photographs_are_not_said_to_agree():
+    found = examination(4, 50 * PRECISION, 0.0, np.random.default_rng(6))
+    assert not found.suspects
+    (warning,) = found.warnings
+    assert 'contradicts the photographs' in warning
