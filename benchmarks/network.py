@@ -30,6 +30,7 @@ TABLES: dict[str, Callable[[int, int | None], list[str]]] = {
     'optimum': lambda seed, runs: network_optimum.table([seed], runs or 20000),
     'outliers': lambda seed, runs: network_outliers.table([seed], runs or 25),
     'scale': lambda seed, runs: network_scale.table([seed]),
+    'from_ids': lambda seed, runs: network_scale.from_ids([seed]),
     'panel': lambda seed, runs: network_starts.panel(),
     'lenses': lambda seed, runs: network_trust.lenses_table([seed], runs or 250),
     'still': lambda seed, runs: network_trust.still_table([seed], runs or 400),

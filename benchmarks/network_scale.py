@@ -9,8 +9,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from ahf_ros.orientation.adjustment import adjust
+from ahf_ros.orientation.orient import orient
 from benchmarks.network_ellipsoids import RELEASED
 from benchmarks.network_scenes import Field, approximate, simulate
+from benchmarks.report import table as markdown
 
 SIZES = (125, 250, 500, 1000)
 
@@ -37,3 +39,20 @@ def table(seeds: Sequence[int]) -> list[str]:
             f'| {end - between:.1f} | {memory:.0f} |'
         )
     return lines
+
+
+def from_ids(seeds: Sequence[int]) -> list[str]:
+    """Return the processor time of photographs that all show 200 targets, from IDs alone."""
+    field = Field(300, 200)
+    network, _ = simulate(field, np.random.default_rng([seeds[0], field.photographs]))
+    begin = time.process_time()
+    (solution,) = orient(network)
+    taken = time.process_time() - begin
+    counts = (
+        field.photographs,
+        field.targets,
+        len(network.observations.xy),
+        solution.oriented.sum(),
+    )
+    head = 'photographs', 'targets', 'image points', 'oriented', 'sigma0', 'processor, s'
+    return markdown(head, [(*counts, f'{solution.sigma0:.3f}', f'{taken:.0f}')])

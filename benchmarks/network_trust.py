@@ -35,11 +35,12 @@ SIZE = Field(36, 108)
 FREEDOM = 5.0
 GROSS, LARGE = 0.01, 6.0
 TOLD = (
-    *(('bars', count, 1e-4) for count in (3, 4, 5)),
-    *(('control points', count, 1e-4) for count in (4, 5, 6, 8)),
-    *(('control points', count, 0.0) for count in (6, 8)),
+    *(('bars', count, 1e-4, 1e-4) for count in (3, 4, 5)),
+    *(('control points', count, 1e-4, 1e-4) for count in (4, 5, 6, 8)),
+    *(('control points', count, 0.0, 0.0) for count in (4, 5, 6, 8)),
+    *(('control points', 8, 0.0, real) for real in (1e-4, 1e-3)),
 )
-"""What is told, how many of them, and their standard deviation, in units of a field of 2."""
+"""What is told, how many, and the standard deviation that is said and had, for a field of 2."""
 _RANK = 1e-10  # of eigenvalues of a covariance without a datum, relative to the largest
 
 
@@ -207,22 +208,24 @@ def told_table(seeds: Sequence[int], runs: int) -> list[str]:
     Apart are errors that leave more than 6 sigma whichever other one is left out instead.
     """
     rows = []
-    for kind, count, sigma in TOLD:
+    for kind, count, sigma, real in TOLD:
         found = []
         for run in progress(range(runs), kind):
-            random = np.random.default_rng([seeds[0], len(kind), count, sigma > 0, run])
+            random = np.random.default_rng(
+                [*seeds, len(kind), count, sigma > 0, round(1e6 * real), run]
+            )
             network, truth = simulate(Field(12, 40), random)
-            start = approximate(truth, random, 0.005)
-            alone = adjust(network, start).measured_points
-            told, wrong, size = _told(kind, count, sigma, truth, alone, random)
+            images = adjust(network, approximate(truth, random, 0.005))
+            alone = images.measured_points
+            told, wrong, size = _told(kind, count, (sigma, real), truth, alone, random)
             network = replace(network, **told)
-            solution = adjust(network, start)
+            solution = adjust(network, images.start)
             clear = [it.name for it in solution.suspects if not it.rivals]
             either = {name for it in solution.suspects for name in (it.name, *it.rivals)}
             found.append(
                 (
                     size > LARGE,
-                    _separation(network, truth, alone) > LARGE,
+                    _separation(network, truth, alone, real**2 - sigma**2) > LARGE,
                     wrong in clear,
                     wrong in either and wrong not in clear,
                     sum(name != wrong for name in clear),
@@ -233,20 +236,23 @@ def told_table(seeds: Sequence[int], runs: int) -> list[str]:
         large, apart = large > 0, (large * apart) > 0
         rows.append(
             (
-                *(f'{count} {kind}', f'{sigma:g}', runs, large.sum()),
+                *(f'{count} {kind}', f'{sigma:g}', f'{real:g}', runs, large.sum()),
                 *(number(100 * it[large].mean(), 1) for it in (named, unclear)),
                 *(apart.sum(), number(100 * named[apart].mean(), 1), good.sum(), rays.sum()),
             )
         )
     head = (
-        *('told', 'sigma', 'runs', 'wrong by over 6 sigma', 'named %', 'among rivals %'),
+        *('told', 'sigma', 'real', 'runs', 'wrong by over 6 sigma', 'named %', 'among rivals %'),
         *('of them apart', 'named %', 'good ones named', 'rays lost'),
     )
     return markdown(head, rows)
 
 
-def _separation(network: Network, truth: Start, alone: MeasuredPoints) -> float:
-    """Return by how many sigma the error of the first one differs from any of another one."""
+def _separation(network: Network, truth: Start, alone: MeasuredPoints, added: float) -> float:
+    """Return by how many sigma the error of the first one differs from any of another one.
+
+    Variances of what is told are larger than it is said by `added`.
+    """
     rows = {name: row for row, name in enumerate(alone.names)}
     points = truth.points[[int(name) for name in alone.names]]
     covariance = similarity_between(alone.xyz, points).turned(alone.covariance)
@@ -265,29 +271,31 @@ def _separation(network: Network, truth: Start, alone: MeasuredPoints) -> float:
     for other in range(1, len(closures.names)):
         kept = np.delete(np.arange(len(closures.names)), other)
         some = error[np.isin(closures.group, kept)]
-        left.append(some @ closures.weighed(kept, np.zeros(len(closures.names)))[1] @ some)
+        left.append(closures.weights(kept, kept).whole(some, added))
     return float(np.sqrt(min(left)))
 
 
 def _told(
     kind: str,
     count: int,
-    sigma: float,
+    sigmas: tuple[float, float],
     truth: Start,
     alone: MeasuredPoints,
     random: np.random.Generator,
 ) -> tuple[dict[str, object], str, float]:
     """Return what is told, which of it is wrong, and by how many standard deviations.
 
-    These are of what is told and of the photographs alone, together.
+    These are of what is told and of the photographs alone, together. Of `sigmas`, the first is
+    said and the second real.
     """
+    sigma, real = sigmas
     size = 4 * 100 ** random.random()
     names = [str(it) for it in random.permutation(len(truth.points))]
     if kind == 'bars':
         pairs = list(zip(names[:count], names[count : 2 * count], strict=True))
         lengths = [np.linalg.norm(truth.points[int(a)] - truth.points[int(b)]) for a, b in pairs]
-        together = np.hypot(sigma, distances(alone, pairs[:1])[0].sigma)
-        errors = random.normal(0, sigma, count)
+        together = np.hypot(real, distances(alone, pairs[:1])[0].sigma)
+        errors = random.normal(0, real, count)
         errors[0] += size * together * random.choice([-1, 1])
         bars = [
             ScaleBar(pair, float(length + error), sigma)
@@ -296,12 +304,12 @@ def _told(
         return {'bars': tuple(bars), 'unit': 'm'}, f'scale bar {"-".join(pairs[0])}', size
     towards = random.standard_normal(3)
     towards /= np.linalg.norm(towards)
-    together = np.sqrt(sigma**2 + towards @ alone.chosen(names[:1]).covariance @ towards)
+    together = np.sqrt(real**2 + towards @ alone.chosen(names[:1]).covariance @ towards)
     control = tuple(
         ControlPoint(
             name,
             truth.points[int(name)]
-            + random.normal(0, sigma, 3)
+            + random.normal(0, real, 3)
             + (place == 0) * size * together * towards,
             sigma**2 * np.eye(3),
         )

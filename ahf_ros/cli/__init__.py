@@ -2,7 +2,7 @@
 
 Standard output is for programs: JSON or nothing. Messages for people go to standard error. The
 exit status is 0; 1 if a file could not be read or written, while the others are processed; 2 if an
-argument is not accepted; 3 if `ahf orient` found known lengths or points that contradict the rest.
+argument is not accepted; 3 if `ahf orient` wrote all, but what it was given does not agree.
 """
 
 from __future__ import annotations

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 REPORT_FILE = 'report.html'
 
 CONTRADICTED = 3
-"""Exit status where all is written, and scale bars, control points or checks contradict it."""
+"""Exit status where all is written, but what was observed and what is known do not agree."""
 
 _LENGTH = re.compile(r'(?P<number>[0-9.]+(e[+-]?[0-9]+)?) *(?P<unit>px|mm)?', re.IGNORECASE)
 
@@ -182,6 +182,8 @@ def _datum(text: str) -> tuple[str, tuple[str, ...]]:
 def run(options: argparse.Namespace) -> int:
     """Orient the photographs, and write each group of them that hangs together."""
     need('orient')
+    from ahf_ros.orientation.verdict import contradicted
+
     try:
         check_mounting(options)
         network, notes = _network(options)
@@ -199,7 +201,7 @@ def run(options: argparse.Namespace) -> int:
     written = [_write(it, number, options) for number, it in enumerate(solutions)]
     if not all(written):
         return 1
-    return CONTRADICTED if any(it.suspects for it in solutions) else 0
+    return CONTRADICTED if any(map(contradicted, solutions)) else 0
 
 
 def _network(options: argparse.Namespace) -> tuple[Network, list[str]]:

@@ -98,14 +98,6 @@ class Solution:
                 'OpenCV: adjust without backward to write it'
             )
 
-    def check_brown(self) -> None:
-        """Raise a ValueError if a lens is a fisheye one, which most software cannot read."""
-        if names := [it.name for it in self.network.cameras if it.equidistant]:
-            raise ValueError(
-                f'camera {names[0]} has an equidistant fisheye lens, accepted are lenses of '
-                "Brown's model; camera_opencv.yaml and camera_ros.yaml have fisheye ones"
-            )
-
     @property
     def oriented(self) -> NDArray[np.bool_]:
         """Which photographs have a pose, (photographs,)."""

@@ -8,21 +8,30 @@ what is known, their covariance C from both, and A as their change under a simil
 tests the rows i of one bar or point against all others, and P_ii^+ v_i is what it differs from
 them [1]_. The worst goes first. Where leaving out another one explains nearly as much, as always
 of two, nobody can tell which is wrong: then both get the variance at which they agree, as do all
-where no few are to blame [2]_, and deviations are tested against that of the rest [3]_. Of so few
-that leaving out any leaves no redundancy to test another, that is said beforehand: an error e of
-one looks like one of j where e' P e is small without j, as may be of four control points.
+where no few are to blame [2]_. Of so few that leaving out any leaves no redundancy to test
+another, that is said beforehand: an error e of one looks like one of j where e' P e is small
+without j, as may be of four control points.
+
+Control points whose precision nobody gave may be exact or not. So each is tested for any standard
+deviation that they may have, and the chance is the mean over these, weighed by the likelihood that
+the others give each [3]_, of what similarities do not change [4]_. With many others, or where
+these agree as well as photographs measure, that is the test of a known variance; where they do
+not, it is Student's, of few degrees of freedom.
 
 References
 ----------
 .. [1] Baarda, A testing procedure for use in geodetic networks, 1968; Förstner & Wrobel,
    Photogrammetric Computer Vision, Springer 2016, 4.6.4.
 .. [2] Paule & Mandel, Consensus values and weighting factors, J. Res. NBS 87 (1982), 377-385.
-.. [3] Rosner, Percentage points for a generalized ESD many-outlier procedure, Technometrics 25
-   (1983), 165-172.
+.. [3] Gelfand, Dey & Chang, Model determination using predictive distributions, Bayesian
+   Statistics 4 (1992), 147-167: cross-validation.
+.. [4] Patterson & Thompson, Recovery of inter-block information when block sizes are unequal,
+   Biometrika 58 (1971), 545-554.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -36,8 +45,10 @@ from ahf_ros.orientation.solution import Suspect
 from ahf_ros.orientation.testing import BY_CHANCE, special
 
 _DECISIVE = 2 * np.log(20)  # chi-square by which one is to blame rather than another: odds of 20
+_UNLIKELY = 1 / 21  # probability of what is given where it is not believed: odds of 20
+_GIVEN = 30  # times as likely, before tests, as any other standard deviation but for a factor of 2
 _CHECKED = 1e-6  # share of a variance that others must leave for something to be tested
-_RANK = 1e-9  # of eigenvalues, relative to the largest
+_RANK = 3e-5  # of singular values, relative to the largest
 _HALVINGS = 40
 _TINY = float(np.finfo(float).tiny)
 _LEAST = 1e-12  # probability that is said
@@ -54,47 +65,98 @@ class Examined(NamedTuple):
 
 @dataclass(frozen=True)
 class _Tested:
-    """Statistics of groups (g,), their degrees of freedom and gaps, and those of all together.
+    """Tests of groups (g,), for each standard deviation (s,) that may be there beside the given.
 
-    With a `common` variance, that of the others is estimated from them.
+    Statistics, degrees of freedom, gaps and log determinants of P_ii are (s, g). `misfits` (s,)
+    are minus twice the log likelihood of all groups and of what was thought of it before.
     """
 
     statistics: FloatArray
     freedom: IntArray
     gaps: FloatArray
-    whole: float
-    redundancy: int
-    common: bool
+    determinants: FloatArray
+    misfits: FloatArray
 
     @property
-    def external(self) -> FloatArray:
-        """Statistics by the variance that all but the tested one have."""
-        if not self.common:
-            return self.statistics
-        rest = np.maximum(self.redundancy - self.freedom, 1)
-        return self.statistics * rest / np.maximum(self.whole - self.statistics, _TINY)
+    def shares(self) -> FloatArray:
+        """How likely all groups make each standard deviation, (s,)."""
+        return _shares(self.misfits)
+
+    @property
+    def by_others(self) -> FloatArray:
+        """How likely all groups but the tested one make each standard deviation, (s, g)."""
+        return _shares(self.misfits[:, None] - self.statistics + self.determinants)
+
+    def expected(self, values: FloatArray) -> FloatArray:
+        """Return the mean (g,) of values (s, g), as the groups but the tested one expect it."""
+        mean: FloatArray = (self.by_others * values).sum(axis=0)
+        return mean
 
     @property
     def chances(self) -> FloatArray:
-        """How often chance makes one of all statistics so large (Bonferroni)."""
-        able = self.freedom > 0
-        freedom = np.maximum(self.freedom, 1)
-        if self.common:
-            rest = self.redundancy - self.freedom
-            able &= rest > 0
-            chances = special().fdtrc(freedom, np.maximum(rest, 1), self.external / freedom)
-        else:
-            chances = special().chdtrc(freedom, self.statistics)
+        """How often chance makes one of all statistics so large (Bonferroni), (g,)."""
+        able = self.freedom.min(axis=0) > 0
+        chances = self.expected(special().chdtrc(np.maximum(self.freedom, 1), self.statistics))
         return np.where(able, np.minimum(able.sum() * chances, 1.0), 1.0)
 
     @property
     def gains(self) -> FloatArray:
         """Twice the log likelihood that leaving out each gains, less its degrees of freedom."""
-        gains = self.statistics
-        if self.common:
-            left = np.maximum(self.whole - self.statistics, _TINY)
-            gains = self.redundancy * np.log(max(self.whole, _TINY) / left)
-        return np.where(self.freedom > 0, gains - self.freedom, -np.inf)
+        without = _likelihood(self.misfits[:, None] - self.statistics)
+        freedom = self.freedom.min(axis=0)
+        gains = without - _likelihood(self.misfits[:, None]) - freedom
+        return np.where(freedom > 0, gains, -np.inf)
+
+    def suspect(self, names: Sequence[str], worst: int, rivals: Iterable[int]) -> Suspect:
+        """Return the suspect that one of the groups is, or one of its rivals instead."""
+        gap = float(self.expected(self.gaps)[worst])
+        others = tuple(names[it] for it in rivals)
+        return Suspect(
+            names[worst],
+            gap,
+            gap / float(np.sqrt(self.expected(self.statistics)[worst])),
+            float(self.chances[worst]),
+            'unclear' if others else 'left out',
+            others,
+        )
+
+
+def _likelihood(misfits: FloatArray) -> FloatArray:
+    """Return twice the log of the mean likelihood over the rows of misfits (s, g)."""
+    best = misfits.min(axis=0)
+    likelihood: FloatArray = 2 * np.log(np.exp((best - misfits) / 2).sum(axis=0)) - best
+    return likelihood
+
+
+def _shares(misfits: FloatArray) -> FloatArray:
+    """Return the share of each row of misfits (s, ...) in the likelihood of all."""
+    likelihood = np.exp((misfits.min(axis=0) - misfits) / 2)
+    shares: FloatArray = likelihood / likelihood.sum(axis=0)
+    return shares
+
+
+@dataclass(frozen=True)
+class Weights:
+    """P of rows, for any standard deviation that some of them have beside the given.
+
+    With its square s, P is W diag(1 / (1 + s d)) W', of `factors` W (r, m) and `sizes` d (m,).
+    `group` (r,) has the groups of rows, `determinant` minus the log of P's pseudo-determinant for
+    s = 0, but for a constant.
+    """
+
+    group: IntArray
+    factors: FloatArray
+    sizes: FloatArray
+    determinant: float
+
+    @property
+    def redundancy(self) -> int:
+        """Rank of P."""
+        return len(self.sizes)
+
+    def whole(self, gaps: FloatArray, variance: float) -> float:
+        """Return the statistic l' P l of gaps l (r,)."""
+        return float(((gaps @ self.factors) ** 2 / (1 + variance * self.sizes)).sum())
 
 
 @dataclass(frozen=True)
@@ -119,57 +181,73 @@ class Misclosures:
         free = rows @ movements(points)
         return cls(tuple(names), group, gaps, free, given, rows @ covariance @ rows.T)
 
-    def weighed(self, kept: IntArray, added: FloatArray) -> tuple[IntArray, FloatArray, int]:
-        """Return the groups of rows that are kept, P, and its rank.
-
-        Variances are larger by `added` (groups,).
-        """
+    def weights(self, kept: IntArray, common: IntArray = _NONE) -> Weights:
+        """Return P of kept groups, of which those in `common` may be less precise than given."""
         rows = np.isin(self.group, kept)
         free, group = self.free[rows], self.group[rows]
-        covariance = self.measured[np.ix_(rows, rows)] + np.diag(self.given[rows] + added[group])
-        # What similarities change may have any variance: no test sees it (Rao 1973, 4i.4).
-        size = np.trace(covariance) / max(float((free**2).sum()), _TINY)
-        weight = np.linalg.inv(covariance + size * free @ free.T)
-        normal = free.T @ weight @ free
-        sizes, axes = np.linalg.eigh(normal)
-        able = sizes > _RANK * sizes[-1]
-        half = weight @ free @ (axes[:, able] / np.sqrt(sizes[able]))
-        return group, weight - half @ half.T, int(rows.sum() - able.sum())
+        basis, sizes, _ = np.linalg.svd(free)
+        contrasts = basis[:, int((sizes > _RANK * sizes[0]).sum()) :]  # no similarity changes them
+        covariance = self.measured[np.ix_(rows, rows)] + np.diag(self.given[rows])
+        factor = np.linalg.cholesky(contrasts.T @ covariance @ contrasts)
+        factors = np.linalg.solve(factor, contrasts.T).T
+        inside = factors[np.isin(group, common)]
+        added, axes = np.linalg.eigh(inside.T @ inside)
+        determinant = 2 * float(np.log(np.diag(factor)).sum())
+        return Weights(group, factors @ axes, np.maximum(added, 0), determinant)
 
-    def tested(self, kept: IntArray, common: IntArray = _NONE, sigma: float = 0.0) -> _Tested:
-        """Return the tests of kept groups, those in `common` with a further sigma."""
-        added = np.zeros(len(self.names))
-        added[common] = sigma**2
-        group, residual, redundancy = self.weighed(kept, added)
-        gaps = self.gaps[np.isin(self.group, kept)]
-        pulls = residual @ gaps
-        statistics, freedom = np.zeros(len(kept)), np.zeros(len(kept), int)
-        differences = np.zeros(len(kept))
-        for place, number in enumerate(kept):
-            own = group == number
-            sizes, axes = np.linalg.eigh(residual[np.ix_(own, own)])
-            checked = sizes > _CHECKED * np.abs(residual).max()
-            along = (axes.T @ pulls[own])[checked]
-            statistics[place] = float((along**2 / sizes[checked]).sum())
-            differences[place] = float(np.linalg.norm(along / sizes[checked]))
-            freedom[place] = int(checked.sum())
-        whole = float(gaps @ pulls)
-        return _Tested(statistics, freedom, differences, whole, redundancy, len(common) > 0)
+    def tested(self, kept: IntArray, common: IntArray = _NONE) -> _Tested:
+        """Return the tests of kept groups, where those in `common` may be less precise than given.
+
+        Standard deviations are tried by factors of two, from a quarter of what photographs have
+        to the largest gap.
+        """
+        sigmas = np.zeros(1)
+        if len(common):
+            smallest = np.sqrt(np.diag(self.measured).mean()) / 4
+            most = max(float(np.abs(self.gaps).max()) / smallest, 2.0)
+            sigmas = np.r_[0, smallest * 2 ** np.arange(np.ceil(np.log2(most)) + 1)]
+        weights, gaps = self.weights(kept, common), self.gaps[np.isin(self.group, kept)]
+        columns = [_tested(weights, gaps, kept, sigma**2) for sigma in sigmas]
+        statistics, freedom, differences, determinants, misfits = map(
+            np.array, zip(*columns, strict=True)
+        )
+        misfits[1:] += 2 * np.log(_GIVEN)
+        return _Tested(statistics, freedom, differences, determinants, misfits)
 
     def agreeing(self, kept: IntArray, blamed: IntArray) -> float:
         """Return the standard deviation, beside the given one, at which kept groups agree.
 
         That of blamed groups grows until the statistic of all is their redundancy.
         """
-        gaps = self.gaps[np.isin(self.group, kept)]
-        added = np.zeros(len(self.names))
+        weights, gaps = self.weights(kept, blamed), self.gaps[np.isin(self.group, kept)]
         low, high = 0.0, 2 * float(np.abs(self.gaps).max())
         for _ in range(_HALVINGS):
             middle = (low + high) / 2
-            added[blamed] = middle**2
-            _, residual, redundancy = self.weighed(kept, added)
-            low, high = (middle, high) if gaps @ residual @ gaps > redundancy else (low, middle)
+            agree = weights.whole(gaps, middle**2) <= weights.redundancy
+            low, high = (low, middle) if agree else (middle, high)
         return high
+
+
+def _tested(
+    weights: Weights, gaps: FloatArray, groups: IntArray, variance: float
+) -> tuple[FloatArray, IntArray, FloatArray, FloatArray, float]:
+    """Return a row of all that tests know, for one variance beside the given."""
+    scaled = weights.factors / (1 + variance * weights.sizes)
+    pulls = scaled @ (weights.factors.T @ gaps)
+    largest = (scaled * weights.factors).sum(axis=1).max()
+    statistics, freedom = np.zeros(len(groups)), np.zeros(len(groups), int)
+    differences, determinants = np.zeros(len(groups)), np.zeros(len(groups))
+    for place, number in enumerate(groups):
+        own = weights.group == number
+        sizes, axes = np.linalg.eigh(scaled[own] @ weights.factors[own].T)
+        checked = sizes > _CHECKED * largest
+        along = (axes.T @ pulls[own])[checked]
+        statistics[place] = float((along**2 / sizes[checked]).sum())
+        differences[place] = float(np.linalg.norm(along / sizes[checked]))
+        freedom[place] = int(checked.sum())
+        determinants[place] = np.log(sizes[checked]).sum()
+    determinant = weights.determinant + float(np.log1p(variance * weights.sizes).sum())
+    return statistics, freedom, differences, determinants, float(gaps @ pulls) + determinant
 
 
 @dataclass
@@ -197,7 +275,8 @@ def examined(
     used = np.flatnonzero(~told)
     if not len(used):
         return Examined(network, (), ())
-    if not closures.tested(used).redundancy:
+    redundancy = closures.weights(used).redundancy
+    if not redundancy:
         return Examined(network, (), () if told.any() else (_unchecked(closures, used),))
     found = _found(closures, used)
     if any(it.rivals for it in found.suspects) and told.any():
@@ -206,8 +285,8 @@ def examined(
         if all(it.name in ours and not it.rivals for it in heard.suspects):
             found = heard
     warnings = _words(network, closures, found, keep)
-    if not (found.suspects or told.any()):
-        warnings += _inseparable(closures, used)
+    if not (found.suspects or len(found.blamed) or told.any()):
+        warnings += _inseparable(closures, used, redundancy)
     if keep:
         kept = tuple(
             replace(it, verdict='kept') if it.verdict == 'left out' else it
@@ -223,11 +302,7 @@ def _found(closures: Misclosures, among: IntArray) -> _Findings:
     All are where even a larger variance makes too many of them suspects, or none.
     """
     given = np.bincount(closures.group, closures.given)
-    silent = among[given[among] == 0]
-    found = _search(closures, among, _NONE)
-    if found and not (found.suspects and len(silent)):
-        return found
-    if len(silent) and (found := _search(closures, among, silent)):
+    if found := _search(closures, among, among[given[among] == 0]):
         return found
     found = _search(closures, among, among)
     return found if found and found.suspects else _all_to_blame(closures, among)
@@ -237,14 +312,8 @@ def _all_to_blame(closures: Misclosures, among: IntArray) -> _Findings:
     """Return that groups contradict each other, and none more than others."""
     test = closures.tested(among)
     worst = int(np.argmax(test.gains))
-    suspect = Suspect(
-        closures.names[among[worst]],
-        float(test.gaps[worst]),
-        float(test.gaps[worst] / np.sqrt(test.external[worst])),
-        float(test.chances[worst]),
-        'unclear',
-        tuple(closures.names[it] for it in np.delete(among, worst)),
-    )
+    names = [closures.names[it] for it in among]
+    suspect = test.suspect(names, worst, np.delete(np.arange(len(among)), worst))
     return _Findings(among, [suspect], among, closures.agreeing(among, among))
 
 
@@ -255,26 +324,18 @@ def _search(closures: Misclosures, among: IntArray, common: IntArray) -> _Findin
     """
     kept, suspects = among, list[Suspect]()
     while 2 * len(suspects) < len(among):
-        sigma = closures.agreeing(kept, common) if len(common) else 0.0
-        test = closures.tested(kept, common, sigma)
-        chances, gains = test.chances, test.gains
+        test = closures.tested(kept, common)
+        gains = test.gains
         worst = int(np.argmax(gains))
-        if chances[worst] >= BY_CHANCE:
-            return _Findings(kept, suspects, np.intersect1d(common, kept), sigma)
+        blamed = np.intersect1d(common, kept) if test.shares[0] < _UNLIKELY else _NONE
+        if test.chances[worst] >= BY_CHANCE:
+            added = closures.agreeing(kept, blamed) if len(blamed) else 0.0
+            return _Findings(kept, suspects, blamed, added)
         near = np.flatnonzero(gains > gains[worst] - _DECISIVE)
-        rivals = [int(it) for it in near if it != worst]
-        suspects.append(
-            Suspect(
-                closures.names[kept[worst]],
-                float(test.gaps[worst]),
-                float(test.gaps[worst] / np.sqrt(test.external[worst])),
-                float(chances[worst]),
-                'unclear' if rivals else 'left out',
-                tuple(closures.names[kept[it]] for it in rivals),
-            )
-        )
-        if rivals:
-            blamed = np.union1d(np.intersect1d(common, kept), kept[[worst, *rivals]])
+        rivals = near[near != worst]
+        suspects.append(test.suspect([closures.names[it] for it in kept], worst, rivals))
+        if len(rivals):
+            blamed = np.union1d(blamed, kept[[worst, *rivals]])
             return _Findings(kept, suspects, blamed, closures.agreeing(kept, blamed))
         kept = np.delete(kept, worst)
     return None
@@ -338,10 +399,9 @@ def _unchecked(closures: Misclosures, used: IntArray) -> str:
     )
 
 
-def _inseparable(closures: Misclosures, used: IntArray) -> tuple[str, ...]:
+def _inseparable(closures: Misclosures, used: IntArray, redundancy: int) -> tuple[str, ...]:
     """Return that an error of one may look like one of another, if so few are known."""
-    test = closures.tested(used)
-    if test.redundancy >= 2 * test.freedom.max():
+    if redundancy >= 2 * closures.tested(used).freedom.max():
         return ()
     return (
         f'{", ".join(closures.names[it] for it in used)} agree, but are too few to tell which one '

@@ -91,6 +91,14 @@ def verdict(solution: Solution) -> Verdict:
     return Verdict(grade, f'{_WORDS[grade]}: {line}.', tuple(it for it in findings if it.text))
 
 
+def contradicted(solution: Solution) -> bool:
+    """Return whether image points do not fit, or known lengths, points or checks contradict them.
+
+    An adjustment that did not converge says that they do not fit, too.
+    """
+    return bool(solution.suspects) or solution.sigma0 > MISFIT or not solution.converged
+
+
 def relative_precision(solution: Solution) -> float:
     """Return N of 1 : N, the largest dimension over the standard deviation of a coordinate.
 

@@ -127,6 +127,20 @@ def test_a_wrong_bar_has_a_status_of_its_own(
     assert (np.abs(error).max() < 0.2) == (not keep)
 
 
+def test_a_calibration_of_another_camera_makes_the_status_3(
+    results: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """All is written; sigma0 and the status say that it does not agree."""
+    wrong = CALIBRATION.copy()
+    wrong[1] += 60  # cx
+    path = tmp_path / 'camera.yaml'
+    path.write_bytes(ros_yaml(CameraView('camera', *SIZE), wrong, np.zeros((10, 10))))
+    assert status('orient', results, '-o', tmp_path / 'out', '--calibration', path) == 3
+    assert read_network(tmp_path / 'out').points.sigma0 > 3
+    told = ' '.join(capsys.readouterr().err.split())
+    assert 'Not to be trusted yet' in told and 'image points do not fit' in told
+
+
 def test_groups_are_written_each_by_itself(
     results: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

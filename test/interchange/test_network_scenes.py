@@ -8,12 +8,14 @@ from __future__ import annotations
 
 import csv
 import json
+import math
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 import pytest
 
@@ -29,14 +31,17 @@ SHEAR, AFFINITY = 9, 8  # in calibrations
 RC = '{http://www.capturingreality.com/ns/xcr/1.1#}'
 
 
-def exact(*lacking: int) -> Solution:
+def exact(*lacking: int, fisheye: bool = False) -> Solution:
     """Return the network without some parameters, its image points as they are computed."""
     seen, start = WHOLE.network.observations, WHOLE.start
     calibrations = start.calibrations.copy()
     calibrations[0, list(lacking)] = 0
+    if fisheye:
+        calibrations[0, 3:8] = 0.03, -0.01, 0.004, -0.002, 0
     poses = start.rotations[seen.photograph], start.positions[seen.photograph]
-    xy = project(calibrations[0], *poses, start.points[seen.point])
-    network = replace(WHOLE.network, observations=replace(seen, xy=xy))
+    xy = project(calibrations[0], *poses, start.points[seen.point], equidistant=fisheye)
+    cameras = (replace(WHOLE.network.cameras[0], equidistant=fisheye),)
+    network = replace(WHOLE.network, observations=replace(seen, xy=xy), cameras=cameras)
     return replace(WHOLE, network=network, start=replace(start, calibrations=calibrations))
 
 
@@ -47,6 +52,14 @@ def distorted(x: float, y: float, k: list[float], along_x: float, along_y: float
     u = x * radial + along_x * (r + 2 * x * x) + 2 * along_y * x * y
     v = y * radial + along_y * (r + 2 * y * y) + 2 * along_x * x * y
     return np.array([u, v])
+
+
+def equidistant(x: float, y: float, k: list[float]) -> np.ndarray:
+    """Return a place by the fisheye model of OpenCV, whose angles are off the axis."""
+    r = math.hypot(x, y)
+    angle = math.atan(r)
+    powers = 1 + sum(it * angle**power for it, power in zip(k, (2, 4, 6, 8), strict=True))
+    return np.array([x, y]) * angle * powers / r
 
 
 def agree(shown: list[np.ndarray], measured: list[np.ndarray]) -> None:
@@ -212,22 +225,27 @@ def alicevision(folder: Path) -> Iterator[tuple[np.ndarray, np.ndarray]]:
     views = {it['viewId']: it for it in scene['views']}
     poses = {it['poseId']: it['pose']['transform'] for it in scene['poses']}
     (lens,) = scene['intrinsics']
-    assert lens['type'] == 'brown'
+    assert lens['type'] in ('brown', 'fisheye4')
     width, height = float(lens['width']), float(lens['height'])
     fx = float(lens['focalLength']) / float(lens['sensorWidth']) * width
     focal = np.array([fx, fx * float(lens['pixelRatio'])])
     middle = floats(lens['principalPoint']) + np.array([width, height]) / 2
-    *k, t1, t2 = floats(lens['distortionParams'])
+    *k, t1, t2 = floats(lens['distortionParams'])  # of Brown's model
     for landmark in scene['structure']:
         for seen in landmark['observations']:
             pose = poses[views[seen['observationId']]['poseId']]
             rotation = floats(pose['rotation']).reshape(3, 3).T  # column after column
             x, y, z = rotation @ (floats(landmark['X']) - floats(pose['center']))
-            yield middle + focal * distorted(x / z, y / z, k, t2, t1), floats(seen['x'])
+            if lens['type'] == 'brown':
+                place = distorted(x / z, y / z, k, t2, t1)
+            else:
+                place = equidistant(x / z, y / z, floats(lens['distortionParams']))
+            yield middle + focal * place, floats(seen['x'])
 
 
-def test_alicevision_projects_its_landmarks(tmp_path: Path) -> None:
-    wanted = exact(SHEAR)
+@pytest.mark.parametrize('fisheye', [False, True])
+def test_alicevision_projects_its_landmarks(tmp_path: Path, fisheye: bool) -> None:
+    wanted = exact(SHEAR, fisheye=fisheye)
     write_network_export('alicevision', tmp_path, wanted)
     shown, measured = zip(*alicevision(tmp_path), strict=True)
     agree(list(shown), list(measured))
@@ -240,20 +258,25 @@ def openmvg(folder: Path) -> Iterator[tuple[np.ndarray, np.ndarray]]:
     views = {it['key']: it['value']['ptr_wrapper']['data'] for it in scene['views']}
     poses = {it['key']: it['value'] for it in scene['extrinsics']}
     (intrinsic,) = (it['value'] for it in scene['intrinsics'])
-    assert intrinsic['polymorphic_name'] == 'pinhole_brown_t2'
     lens = intrinsic['ptr_wrapper']['data']
-    *k, t1, t2 = lens['disto_t2']
+    kind = {'pinhole_brown_t2': 'disto_t2', 'fisheye': 'fisheye'}[intrinsic['polymorphic_name']]
     for landmark in scene['structure']:
         for seen in landmark['value']['observations']:
             pose = poses[views[seen['key']]['id_pose']]
             ray = np.array(landmark['value']['X']) - pose['center']
             x, y, z = np.array(pose['rotation']) @ ray
-            place = lens['focal_length'] * distorted(x / z, y / z, k, t2, t1)
-            yield lens['principal_point'] + place, np.array(seen['value']['x'])
+            if kind == 'fisheye':
+                place = equidistant(x / z, y / z, lens[kind])
+            else:
+                *k, t1, t2 = lens[kind]
+                place = distorted(x / z, y / z, k, t2, t1)
+            shown = lens['principal_point'] + lens['focal_length'] * place
+            yield shown, np.array(seen['value']['x'])
 
 
-def test_openmvg_projects_its_landmarks(tmp_path: Path) -> None:
-    write_network_export('openmvg', tmp_path, exact(SHEAR, AFFINITY))
+@pytest.mark.parametrize('fisheye', [False, True])
+def test_openmvg_projects_its_landmarks(tmp_path: Path, fisheye: bool) -> None:
+    write_network_export('openmvg', tmp_path, exact(SHEAR, AFFINITY, fisheye=fisheye))
     shown, measured = zip(*openmvg(tmp_path), strict=True)
     agree(list(shown), list(measured))
     scene = json.loads((tmp_path / 'sfm_data.json').read_text())
@@ -386,9 +409,51 @@ def test_jag3d_has_the_whole_covariance(tmp_path: Path) -> None:
 
 
 def test_lists_of_points_need_no_lens(tmp_path: Path) -> None:
-    cameras = (replace(WHOLE.network.cameras[0], equidistant=True),)
-    fisheye = replace(WHOLE, network=replace(WHOLE.network, cameras=cameras))
     for name in ('ply', 'dxf', 'vstars', 'jag3d'):
-        assert write_network_export(name, tmp_path / name, fisheye)
-    with pytest.raises(ValueError, match='has an equidistant fisheye lens, accepted are'):
-        write_network_export('openmvg', tmp_path / 'openmvg', fisheye)
+        assert write_network_export(name, tmp_path / name, exact(fisheye=True))
+
+
+@pytest.mark.parametrize('name', ['mmvii', 'blocksexchange', 'realitycapture', 'opf', 'bundler'])
+def test_formats_without_fisheye_lenses_say_so(tmp_path: Path, name: str) -> None:
+    message = f'has an equidistant fisheye lens, accepted by {name} are .*; colmap, metashape, '
+    with pytest.raises(ValueError, match=message):
+        write_network_export(name, tmp_path / name, exact(fisheye=True))
+
+
+def test_colmap_has_the_fisheye_lens_of_opencv(tmp_path: Path) -> None:
+    wanted = exact(SHEAR, fisheye=True)
+    write_network_export('colmap', tmp_path, wanted)
+    _, model, width, height, *lens = (tmp_path / 'cameras.txt').read_text().split('\n')[1].split()
+    assert (model, int(width), int(height)) == ('OPENCV_FISHEYE', *SIZE)
+    fx, fy, cx, cy, *k = floats(lens)
+    matrix = np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1]])
+    seen, start = wanted.network.observations, wanted.start
+    turned = start.points[seen.point] - start.positions[seen.photograph]
+    there = np.einsum('nij,nj->ni', start.rotations[seen.photograph], turned)
+    none = np.zeros((1, 3))
+    shown = cv2.fisheye.projectPoints(there[:, None], none, none, matrix, np.array(k))[0][:, 0]
+    agree(list(shown), list(seen.xy + 0.5))
+
+
+def test_metashape_has_a_distorted_equidistant_lens(tmp_path: Path) -> None:
+    """Angles off the axis are distorted, by its manual, appendix D, Fisheye cameras."""
+    wanted = exact(fisheye=True)
+    write_network_export('metashape', tmp_path, wanted)
+    lens = {it.tag: it.text for it in ElementTree.parse(tmp_path / 'camera.xml').getroot()}
+    sensor = ElementTree.parse(tmp_path / 'cameras.xml').find('.//sensor')
+    assert lens.pop('projection') == sensor.attrib['type'] == 'fisheye'
+    value = {name: float(text) for name, text in lens.items()}
+    seen, start = wanted.network.observations, wanted.start
+    shown = []
+    for photograph, point in zip(seen.photograph, seen.point, strict=True):
+        ray = start.rotations[photograph] @ (start.points[point] - start.positions[photograph])
+        x, y = ray[:2] / ray[2]
+        r = math.hypot(x, y)
+        x, y = x * math.atan(r) / r, y * math.atan(r) / r
+        r = math.hypot(x, y)
+        radial = 1 + sum(value[f'k{it}'] * r ** (2 * it) for it in (1, 2, 3, 4))
+        u, v = x * radial, y * radial
+        along = u * value['f'] + u * value['b1'] + v * value['b2']
+        middle = SIZE[0] / 2 + value['cx'], SIZE[1] / 2 + value['cy']
+        shown.append(np.array([middle[0] + along, middle[1] + v * value['f']]))
+    agree(shown, list(seen.xy + 0.5))

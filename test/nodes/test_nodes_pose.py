@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Iterator
 from copy import copy
+from dataclasses import replace
 from functools import cache
 from itertools import count
 from pathlib import Path
@@ -24,6 +25,7 @@ from std_msgs.msg import Header
 
 from ahf_ros.interchange.camera_info import calibration, undistorted
 from ahf_ros.msg import CodedTarget, CodedTargetArray
+from ahf_ros.orientation.camera import project
 from ahf_ros.target import Target
 from benchmarks.registration_pose import CAMERA, SIZE, View, view
 from support.detector import overrides, own, values
@@ -215,6 +217,29 @@ def test_what_is_wrong_is_said_and_nothing_is_published(
     )
     node.graph.until(lambda: number_of(node.poses[-1]) == 500)
     assert not {number_of(it) for it in node.poses} & set(unknown)
+
+
+def test_a_fisheye_camera_has_the_pose_that_it_has(graph: Any, tmp_path: Path) -> None:
+    """Targets are imaged by the equidistant model; Brown's would be off by many pixels."""
+    of = scene()
+    lens = np.array([900.0, *CAMERA[1:3], 0.03, -0.01, 0.004, -0.002, 0.0, 0.0, 0.0])
+    known = of.points.xyz[of.points.indices([str(it.id) for it in of.targets])]
+    places = project(lens, of.true.rotation.T, of.true.translation, known, equidistant=True)
+    targets = tuple(
+        replace(it, x=x, y=y) for it, (x, y) in zip(of.targets, places.tolist(), strict=True)
+    )
+    points = coordinates(tmp_path / 'points.json', of)
+    node = PoseProcess(graph, '/fisheye', points)
+    f, cx, cy, *distortion = lens[:7].tolist()
+    k = [f, 0.0, cx, 0.0, f, cy, 0.0, 0.0, 1.0]
+    node.camera.publish(info(distortion_model='equidistant', d=distortion, k=k))
+    message = seen(replace(of, targets=targets), 10)
+    graph.until(lambda: node.targets.publish(message) or node.poses)
+    found = node.poses[-1].pose
+    position = [getattr(found.pose.position, it) for it in 'xyz']
+    covariance = np.reshape(found.covariance, (6, 6))[:3, :3]
+    gap = position - of.true.translation
+    assert gap @ np.linalg.solve(covariance, gap) < 16
 
 
 def test_rectified_images_need_no_k(graph: Any, tmp_path: Path) -> None:

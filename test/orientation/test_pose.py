@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from ahf_ros import Target, resect
-from ahf_ros.orientation.camera import project
+from ahf_ros.orientation.camera import project, rotation_matrices
 from ahf_ros.orientation.points import MeasuredPoints
+from ahf_ros.orientation.transform import Transform
 from benchmarks.registration_pose import (
     CAMERA,
     View,
@@ -47,6 +48,33 @@ def test_errors_are_as_large_as_covariances_say(width: float, depth: float) -> N
     assert (counts.refused, counts.flipped, counts.good_rejected) == (0, 0, 0)
     assert counts.named == counts.wrong == 5
     assert counts.moved < 1e-3
+
+
+def test_a_fisheye_camera_sees_targets_far_off_its_axis() -> None:
+    """Up to 70 degrees; one has a wrong ID."""
+    lens = np.array([620.0, 805.0, 596.0, 0.03, -0.01, 0.004, -0.002, 0.0, 0.0, 0.0])
+    squares = []
+    for seed in range(40):
+        random = seeded(5, seed)
+        angles, around = random.uniform((0, 0), (1.2, 2 * np.pi), (24, 2)).T
+        aside = np.sin(angles) * (np.cos(around), np.sin(around))
+        xyz = (random.uniform(1, 2, 24) * (*aside, np.cos(angles))).T
+        turn = rotation_matrices(random.normal(size=(1, 3)))[0]
+        true = Transform(turn, random.normal(size=3))
+        known = xyz @ turn.T + true.translation
+        points = MeasuredPoints(tuple(map(str, range(24))), known, np.zeros((72, 72)), unit='m')
+        seen = project(lens, turn.T, true.translation, known, equidistant=True)
+        seen += random.normal(0, 0.05, seen.shape)
+        covariance = (0.0025, 0.0, 0.0, 0.0025)
+        targets = [
+            Target(number, 0, x, y, 8.0, 8.0, covariance=covariance)
+            for number, (x, y) in enumerate(seen.tolist())
+        ]
+        targets[2:4] = [replace(targets[2], id=3)]
+        pose = resect(targets, points, lens, equidistant=True)
+        assert [it.target for it in pose.rejected] == ['3']
+        squares.append(normalised_square(pose.camera, true))
+    assert np.mean(squares) == pytest.approx(6, abs=4 * np.sqrt(12 / 40))
 
 
 def test_covariances_are_about_the_fixed_axes_of_the_frame() -> None:

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ahf_ros.orientation.camera import PARAMETERS, measured_places
+from ahf_ros.orientation.camera import measured_places, parameters_of
 from ahf_ros.orientation.network import FloatArray
 from ahf_ros.orientation.solution import Solution
 
@@ -16,7 +16,10 @@ _GRID = 9  # places in a row of an image, at which lenses are compared
 
 
 class Lens(NamedTuple):
-    """A calibration whose focal lengths may differ, px; the principal point has our origin."""
+    """A calibration whose focal lengths may differ, px; the principal point has our origin.
+
+    An equidistant fisheye lens has k4 and no p1 and p2, others have no k4.
+    """
 
     fx: float
     fy: float
@@ -27,6 +30,7 @@ class Lens(NamedTuple):
     k3: float
     p1: float
     p2: float
+    k4: float
 
 
 class Seen(NamedTuple):
@@ -39,11 +43,12 @@ class Seen(NamedTuple):
 
 def lens_of(solution: Solution, camera: int, *, square: bool = False) -> Lens:
     """Return the lens of a camera without shear; if `square`, with one focal length."""
-    value = dict(zip(PARAMETERS, solution.start.calibrations[camera].tolist(), strict=True))
+    names = parameters_of(solution.network.cameras[camera])
+    value = dict(zip(names, solution.start.calibrations[camera].tolist(), strict=True))
     fx, fy = value['f'] * (1 + value['affinity']), value['f']
     if square:
         fx = fy = (fx + fy) / 2
-    return Lens(fx, fy, *(value[name] for name in Lens._fields[2:]))
+    return Lens(fx, fy, *(value.get(name, 0.0) for name in Lens._fields[2:]))
 
 
 def lens_loss(solution: Solution, *, square: bool) -> float:

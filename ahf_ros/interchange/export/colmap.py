@@ -15,9 +15,9 @@ from pathlib import Path
 
 import numpy as np
 
+from ahf_ros.interchange.export.adjusted import lens_of, numbers
 from ahf_ros.interchange.export.survey import Survey
 from ahf_ros.interchange.files import csv_table, file_errors
-from ahf_ros.orientation.camera import PARAMETERS
 from ahf_ros.orientation.solution import Solution
 from ahf_ros.orientation.transform import Transform
 
@@ -159,17 +159,19 @@ def _points_of_images(solution: Solution) -> list[list[int]]:
 
 
 def _cameras(solution: Solution) -> list[str]:
-    """Return cameras of the model FULL_OPENCV, without its denominator."""
-    lines = ['# CAMERA_ID, MODEL, WIDTH, HEIGHT, fx fy cx cy k1 k2 p1 p2 k3 k4 k5 k6']
+    """Return cameras: FULL_OPENCV without its denominator, and OPENCV_FISHEYE."""
+    lines = ['# CAMERA_ID, MODEL, WIDTH, HEIGHT, PARAMS[]']
     for index, view in enumerate(solution.network.cameras):
         if not solution.calibrated[index]:
             continue
-        value = dict(zip(PARAMETERS, solution.start.calibrations[index].tolist(), strict=True))
-        fx = value['f'] * (1 + value['affinity'])
-        numbers = [fx, value['f'], value['cx'] + _SHIFT, value['cy'] + _SHIFT]
-        numbers += [value[name] for name in ('k1', 'k2', 'p1', 'p2', 'k3')] + [0.0] * 3
-        text = ' '.join(f'{number:.15g}' for number in numbers)
-        lines.append(f'{index + 1} FULL_OPENCV {view.width} {view.height} {text}')
+        lens = lens_of(solution, index)
+        values = [lens.fx, lens.fy, lens.cx + _SHIFT, lens.cy + _SHIFT, lens.k1, lens.k2]
+        if view.equidistant:
+            model, values = 'OPENCV_FISHEYE', [*values, lens.k3, lens.k4]
+        else:
+            model, values = 'FULL_OPENCV', [*values, lens.p1, lens.p2, lens.k3, 0.0, 0.0, 0.0]
+        size = f'{view.width} {view.height}'
+        lines.append(f'{index + 1} {model} {size} {numbers(np.array(values))}')
     return lines
 
 
@@ -183,9 +185,8 @@ def _images(solution: Solution, points_of: list[list[int]]) -> list[str]:
             raise ValueError(f'image is {name!r}, accepted is a name that prints')
         rotation = values.rotations[index]
         x, y, z, w = Transform(rotation).quaternion
-        numbers = [w, x, y, z, *(-rotation @ values.positions[index])]
-        text = ' '.join(f'{number:.15g}' for number in numbers)
-        lines.append(f'{index + 1} {text} {network.camera_of[index] + 1} {name}')
+        pose = numbers(np.array([w, x, y, z, *(-rotation @ values.positions[index])]))
+        lines.append(f'{index + 1} {pose} {network.camera_of[index] + 1} {name}')
         seen = network.observations
         points = [
             f'{seen.xy[row, 0] + _SHIFT:.6f} {seen.xy[row, 1] + _SHIFT:.6f} {seen.point[row] + 1}'
@@ -206,7 +207,7 @@ def _points(solution: Solution, points_of: list[list[int]]) -> list[str]:
     lines = ['# POINT3D_ID, X, Y, Z, R, G, B, ERROR, then IMAGE_ID, POINT2D_IDX']
     for index, track in enumerate(tracks):
         if track and solution.determined[index]:
-            xyz = ' '.join(f'{value:.15g}' for value in values.points[index])
+            xyz = numbers(values.points[index])
             mean = np.mean([it[2] for it in track])
             pairs = ' '.join(f'{image} {place}' for image, place, _ in track)
             lines.append(f'{index + 1} {xyz} {_GRAY} {mean:.6g} {pairs}')

@@ -52,13 +52,14 @@ class NetworkFormat:
     """A format of an adjusted network: what makes its files, and what its lens lacks.
 
     `writer` is as in `Format`. `lacks` is 'shear', or 'affinity and shear', or empty. `paths` says
-    whether names of photographs may be the same in several folders. Without `cameras`, it holds
-    targets alone.
+    whether names of photographs may be the same in several folders, `fisheye` whether it holds
+    equidistant fisheye lenses. Without `cameras`, it holds targets alone.
     """
 
     writer: str
     lacks: Literal['', 'shear', 'affinity and shear'] = ''
     paths: bool = False
+    fisheye: bool = False
     cameras: bool = True
 
 
@@ -66,8 +67,12 @@ _BOTH: Literal['affinity and shear'] = 'affinity and shear'
 _POINTS = 'interchange.export.point_files'
 
 NETWORK_FORMATS: Mapping[str, NetworkFormat] = {
-    'colmap': NetworkFormat('interchange.export.colmap:colmap_model_files', 'shear', paths=True),
-    'metashape': NetworkFormat('interchange.export.xml_files:metashape_network_files'),
+    'colmap': NetworkFormat(
+        'interchange.export.colmap:colmap_model_files', 'shear', paths=True, fisheye=True
+    ),
+    'metashape': NetworkFormat(
+        'interchange.export.xml_files:metashape_network_files', fisheye=True
+    ),
     'mmvii': NetworkFormat('interchange.export.xml_files:mmvii_network_files'),
     'blocksexchange': NetworkFormat(
         'interchange.export.blocks_exchange:blocks_exchange_files', 'shear'
@@ -77,9 +82,11 @@ NETWORK_FORMATS: Mapping[str, NetworkFormat] = {
     ),
     'opf': NetworkFormat('interchange.export.opf_network:opf_network_files', _BOTH, paths=True),
     'alicevision': NetworkFormat(
-        'interchange.export.sfm_data:alicevision_files', 'shear', paths=True
+        'interchange.export.sfm_data:alicevision_files', 'shear', paths=True, fisheye=True
     ),
-    'openmvg': NetworkFormat('interchange.export.sfm_data:openmvg_files', _BOTH, paths=True),
+    'openmvg': NetworkFormat(
+        'interchange.export.sfm_data:openmvg_files', _BOTH, paths=True, fisheye=True
+    ),
     'bundler': NetworkFormat('interchange.export.bundler:bundler_files'),
     'ply': NetworkFormat(f'{_POINTS}:ply_files', cameras=False),
     'dxf': NetworkFormat(f'{_POINTS}:dxf_files', cameras=False),
@@ -150,7 +157,8 @@ def write_network_export(format_name: str, folder: Path, solution: Solution) -> 
     kind = NETWORK_FORMATS[format_name]
     if kind.cameras:
         solution.check_forward()
-        solution.check_brown()
+    if kind.cameras and not kind.fisheye:
+        _check_lenses(format_name, solution)
     names = [PurePath(it).name for it in solution.network.photographs]
     if kind.cameras and not kind.paths and len(set(names)) < len(names):
         raise ValueError(
@@ -158,6 +166,17 @@ def write_network_export(format_name: str, folder: Path, solution: Solution) -> 
             'folders'
         )
     return _written(folder, resolve_name(f'ahf_ros.{kind.writer}')(solution))
+
+
+def _check_lenses(format_name: str, solution: Solution) -> None:
+    """Raise a ValueError if a lens is a fisheye one, which the format does not hold."""
+    able = [name for name, it in NETWORK_FORMATS.items() if it.fisheye]
+    if names := [it.name for it in solution.network.cameras if it.equidistant]:
+        raise ValueError(
+            f'camera {names[0]} has an equidistant fisheye lens, accepted by {format_name} are '
+            f"lenses of Brown's model; {', '.join(able)}, camera_opencv.yaml and camera_ros.yaml "
+            'have fisheye ones'
+        )
 
 
 def network_remark(format_name: str, solution: Solution) -> str:

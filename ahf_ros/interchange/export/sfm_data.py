@@ -1,9 +1,10 @@
 """Adjusted networks as scenes of AliceVision (Meshroom) and OpenMVG, both in JSON.
 
-Both have our frame of the camera, and Brown's distortion as OpenCV has it. (0, 0) is the centre of
-the first pixel, as in their features and undistorted images. AliceVision keeps a rotation column
-after column, its principal point from the middle of the image, and its focal length in mm of a
-sensor; OpenMVG has one focal length, and its file is what the library cereal writes.
+Both have our frame of the camera, and Brown's and the fisheye distortion as OpenCV has them.
+(0, 0) is the centre of the first pixel, as in their features and undistorted images. AliceVision
+keeps a rotation column after column, its principal point from the middle of the image, and its
+focal length in mm of a sensor; OpenMVG has one focal length, and its file is what the library
+cereal writes.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from ahf_ros.interchange.export.adjusted import by_target, file_name, lens_of, oriented
+from ahf_ros.interchange.export.adjusted import Lens, by_target, file_name, lens_of, oriented
 from ahf_ros.orientation.solution import Solution
 
 _SENSOR = 36.0, 24.0  # mm, which AliceVision takes where nothing says the size
@@ -88,7 +89,7 @@ def _alicevision_lens(solution: Solution, camera: int) -> dict[str, Any]:
         'sensorWidth': _SENSOR[0],
         'sensorHeight': _SENSOR[1],
         'serialNumber': view.name,
-        'type': 'brown',
+        'type': 'fisheye4' if view.equidistant else 'brown',
         'initializationMode': 'calibrated',
         'initialFocalLength': focal,
         'focalLength': focal,
@@ -96,11 +97,17 @@ def _alicevision_lens(solution: Solution, camera: int) -> dict[str, Any]:
         'pixelRatioLocked': 'true',
         'principalPoint': [lens.cx - view.width / 2, lens.cy - view.height / 2],
         'distortionInitializationMode': 'calibrated',
-        'distortionParams': [lens.k1, lens.k2, lens.k3, lens.p1, lens.p2],
+        'distortionParams': _distortion(lens, view.equidistant),
         'undistortionOffset': [0, 0],
         'undistortionParams': '',
         'locked': 'true',
     }
+
+
+def _distortion(lens: Lens, equidistant: bool) -> list[float]:
+    """Return the coefficients of a lens as both programs order them."""
+    beside = [lens.k4] if equidistant else [lens.p1, lens.p2]
+    return [lens.k1, lens.k2, lens.k3, *beside]
 
 
 def _as_texts(value: Any) -> Any:
@@ -121,14 +128,14 @@ def openmvg_files(solution: Solution) -> dict[str, bytes]:
     posed, tracks = oriented(solution), by_target(solution)
     folders = {str(PurePath(network.photographs[number]).parent) for number in posed}
     root = folders.pop() if len(folders) == 1 else ''
-    pointers = count(1)
+    pointers, kinds = count(1), dict[str, int]()
     scene = {
         'sfm_data_version': '0.3',
         'root_path': root,
         'views': [_openmvg_view(solution, number, bool(root), pointers) for number in posed],
         'intrinsics': [
-            _openmvg_intrinsic(solution, camera, index == 0, pointers)
-            for index, camera in enumerate(np.flatnonzero(solution.calibrated).tolist())
+            _openmvg_intrinsic(solution, camera, kinds, pointers)
+            for camera in np.flatnonzero(solution.calibrated).tolist()
         ],
         'extrinsics': [
             _entry(
@@ -173,19 +180,21 @@ def _openmvg_view(
 
 
 def _openmvg_intrinsic(
-    solution: Solution, camera: int, first: bool, pointers: Iterator[int]
+    solution: Solution, camera: int, kinds: dict[str, int], pointers: Iterator[int]
 ) -> dict[str, Any]:
     view, lens = solution.network.cameras[camera], lens_of(solution, camera, square=True)
+    name, field = ('fisheye',) * 2 if view.equidistant else ('pinhole_brown_t2', 'disto_t2')
     data = {
         'width': view.width,
         'height': view.height,
         'focal_length': lens.fx,
         'principal_point': [lens.cx, lens.cy],
-        'disto_t2': [lens.k1, lens.k2, lens.k3, lens.p1, lens.p2],
+        field: _distortion(lens, view.equidistant),
     }
-    kind: dict[str, Any] = {'polymorphic_id': 1}
-    if first:  # which names the type for all
-        kind = {'polymorphic_id': _NEW | 1, 'polymorphic_name': 'pinhole_brown_t2'}
+    kind: dict[str, Any] = {'polymorphic_id': kinds.get(name, _NEW | len(kinds) + 1)}
+    if name not in kinds:  # which names the type for all
+        kinds[name] = len(kinds) + 1
+        kind['polymorphic_name'] = name
     return _entry(camera, **kind, ptr_wrapper={'id': _NEW | next(pointers), 'data': data})
 
 

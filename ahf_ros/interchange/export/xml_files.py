@@ -15,8 +15,8 @@ import numpy as np
 
 from ahf_ros.interchange.export import metashape_console
 from ahf_ros.interchange.export.survey import Survey
-from ahf_ros.orientation.camera import PARAMETERS
-from ahf_ros.orientation.network import FloatArray
+from ahf_ros.orientation.camera import PARAMETERS, parameters_of
+from ahf_ros.orientation.network import CameraView, FloatArray
 from ahf_ros.orientation.solution import Solution
 
 NAME = 'ahf'
@@ -142,7 +142,7 @@ def metashape_network_files(solution: Solution) -> dict[str, bytes]:
     for index, view in enumerate(network.cameras):
         if solution.calibrated[index]:
             root = Element('calibration')
-            SubElement(root, 'projection').text = 'frame'
+            SubElement(root, 'projection').text = _metashape_type(view)
             SubElement(root, 'width').text = str(view.width)
             SubElement(root, 'height').text = str(view.height)
             for name, value in _metashape_lens(solution, index).items():
@@ -152,11 +152,19 @@ def metashape_network_files(solution: Solution) -> dict[str, bytes]:
     return files
 
 
+def _metashape_type(view: CameraView) -> str:
+    """Return Metashape's name of a lens; a fisheye one is equidistant, and then distorted."""
+    return 'fisheye' if view.equidistant else 'frame'
+
+
 def _metashape_lens(solution: Solution, index: int) -> dict[str, float]:
     """Return a calibration with the principal point from the middle of the image, px."""
     view = solution.network.cameras[index]
-    value = dict(zip(PARAMETERS, solution.start.calibrations[index].tolist(), strict=True))
+    value = dict(
+        zip(parameters_of(view), solution.start.calibrations[index].tolist(), strict=True)
+    )
     f = value['f']
+    beside = {'k4': value['k4']} if view.equidistant else {'p1': value['p2'], 'p2': value['p1']}
     return {
         'f': f,
         'cx': value['cx'] + _SHIFT - view.width / 2,
@@ -166,8 +174,7 @@ def _metashape_lens(solution: Solution, index: int) -> dict[str, float]:
         'k1': value['k1'],
         'k2': value['k2'],
         'k3': value['k3'],
-        'p1': value['p2'],
-        'p2': value['p1'],
+        **beside,
     }
 
 
@@ -177,11 +184,12 @@ def _metashape_cameras(chunk: Element, solution: Solution) -> None:
     for index, view in enumerate(network.cameras):
         if not solution.calibrated[index]:
             continue
-        about = {'id': str(index), 'label': view.name, 'type': 'frame'}
+        kind = _metashape_type(view)
+        about = {'id': str(index), 'label': view.name, 'type': kind}
         sensor = SubElement(sensors, 'sensor', about)
         size = {'width': str(view.width), 'height': str(view.height)}
         SubElement(sensor, 'resolution', size)
-        lens = SubElement(sensor, 'calibration', {'type': 'frame', 'class': 'adjusted'})
+        lens = SubElement(sensor, 'calibration', {'type': kind, 'class': 'adjusted'})
         SubElement(lens, 'resolution', size)
         for name, value in _metashape_lens(solution, index).items():
             SubElement(lens, name).text = f'{value:.15g}'
