@@ -169,8 +169,9 @@ def _are_read(
     """Return which quadrilaterals, shape (k, 4, 2), are where a marker was surely read, (k,)."""
     sure = np.concatenate(corners)[np.concatenate(readings)[:, 3] > _SURE]
     distances = np.linalg.norm(places.mean(axis=1)[:, None] - sure.mean(axis=1), axis=2)
-    near: np.ndarray = distances <= _SAME_PLACE * side_lengths(places).max(axis=1)[:, None]
-    return near.any(axis=1)
+    near = distances <= _SAME_PLACE * side_lengths(places).max(axis=1)[:, None]
+    read_before: np.ndarray = near.any(axis=1)
+    return read_before
 
 
 def _laid(
