@@ -40,9 +40,9 @@ def readings(image: np.ndarray) -> dict[int, Hypotheses]:
 def test_a_picture_enlarged_twice_shows_as_much_of_what_is_typical(radius, light, most):
     """Of each target within 5 or 25 %; log odds themselves are held to what they are today.
 
-    They should stay within 25 %, too, but those of dots below 20 px are sums over as many samples as
-    the band has pixels, whose noise counts as independent: evidence doubles, and margins grow by
-    a third to six tenths in the median.
+    They should stay within 25 %, too, but those of dots below 20 px are sums over as many samples
+    as the band has pixels, whose noise counts as independent: evidence doubles, and margins grow
+    by a third to six tenths in the median.
     """
     image = rendering(**SIZE, dot_radius=radius, light=light, ambient=0.3).image
     small, large = readings(image), readings(resized(image, 2))
