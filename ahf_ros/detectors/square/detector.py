@@ -27,9 +27,9 @@ from ahf_ros.features.pyramid import halved
 from ahf_ros.imaging.image import as_gray, check_image
 from ahf_ros.target import SquareMarker, Target, sorted_targets
 
-# Of a centre from contours where nothing else can be fitted, in sides: on paper with waves of 0.5 to
-# 3 px, 0.021 of 169 markers and 0.032 of 85, none beyond three of these. On flat and on bent sheets,
-# in any light, edges or print are fitted: of 2,133 markers none was left.
+# Of a centre from contours where nothing else can be fitted, in sides: on paper with waves of 0.5
+# to 3 px, 0.021 of 169 markers and 0.032 of 85, none beyond three of these. On flat and on bent
+# sheets, in any light, edges or print are fitted: of 2,133 markers none was left.
 _DRAFT_DEVIATION = 0.028
 _SMALL = 28.0  # diagonal of a marker whose cells are not much larger than pixels, px
 _SMALLEST_HALF = 24  # smaller side of a half that markers are looked for in, px
