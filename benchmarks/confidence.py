@@ -22,7 +22,7 @@ from ahf_ros.detectors.ring.contests import overlapping
 from ahf_ros.detectors.ring.detector import find_hypotheses
 from ahf_ros.detectors.ring.hypotheses import Hypotheses
 from ahf_ros.imaging.image import as_gray
-from benchmarks.conditions import COMMON, FOREIGN, scenes
+from benchmarks.conditions import COMMON, FOREIGN, Scene, scenes
 from benchmarks.reliability import NEAR, Parts, gathered, reliability_table, run
 
 COVERED = ('cover', 'cover like paper', 'another target')
@@ -43,19 +43,27 @@ _HIDDEN, _TRACE = 0.03, -1.4  # share of the band, and feature of arcs, without 
 
 def readings(seed: int) -> Parts:
     """Yield condition, features, rightness and covers of all plausible readings of each scene."""
-    for scene in scenes(seed):
-        code = scene.settings.codes(Family)[0]
-        read = find_hypotheses(as_gray(scene.image), scene.settings)
-        read = read.select(read.words > 0)
-        _, ids = canonical(read.words, code)
-        true = [(target.x, target.y, target.id) for target in scene.truth]
-        x, y, number = np.array(true).reshape(-1, 3).T
-        near = np.hypot(read.frames[:, :1, 2] - x, read.frames[:, 1:2, 2] - y) < NEAR
-        right = (near & (ids[:, None] == number)).any(axis=1)
-        seen = near.any(axis=1) | (not scene.others)
-        seen &= right | ~_below_right_ones(read, right)
-        condition = np.full(seen.sum(), scene.condition)
-        yield condition, features(read.select(seen)), right[seen], read.hidden[seen]
+    return map(readings_of, scenes(seed))
+
+
+def readings_of(scene: Scene) -> tuple[np.ndarray, ...]:
+    """Return condition, features, rightness and covers of the plausible readings of a scene.
+
+    Those of targets that nobody is asked for are left out.
+    """
+    code = scene.settings.codes(Family)[0]
+    read = find_hypotheses(as_gray(scene.image), scene.settings)
+    read = read.select(read.words > 0)
+    _, ids = canonical(read.words, code)
+    true = [(of.x, of.y, of.id, getattr(of, 'confirmed', True)) for of in scene.truth]
+    x, y, number, asked = np.array(true).reshape(-1, 4).T
+    near = np.hypot(read.frames[:, :1, 2] - x, read.frames[:, 1:2, 2] - y) < NEAR
+    right = (near & (ids[:, None] == number)).any(axis=1)
+    seen = near.any(axis=1) | (not scene.others)
+    seen &= right | ~_below_right_ones(read, right)
+    seen &= ~near[:, asked == 0].any(axis=1)
+    condition = np.full(seen.sum(), scene.condition)
+    return condition, features(read.select(seen)), right[seen], read.hidden[seen]
 
 
 def _below_right_ones(read: Hypotheses, right: np.ndarray) -> np.ndarray:

@@ -250,6 +250,7 @@ SQUARE = [
         'detectors.square.detector:_SAME_PLACE',
         '0.0',
     ),
+    Gate('places of sure markers in halves', 'detectors.square.detector:_SURE', '1e9'),
 ]
 
 CCTAG = [

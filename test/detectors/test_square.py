@@ -228,6 +228,38 @@ def test_small_markers_whose_ink_has_grown(family, least):
     assert wrong == false == 0
 
 
+def washed_out(number: int, cell: int) -> np.ndarray:
+    """Return a marker whose paper is as bright as can be, and grown by a quarter of a cell."""
+    paper = cv2.copyMakeBorder(
+        marker('apriltag_36h11', number, 32), *[96] * 4, cv2.BORDER_CONSTANT, value=255
+    )
+    grown = cv2.dilate(paper, cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (15, 15)))
+    sides = [cell * len(grown) // 32] * 2
+    light = cv2.resize(grown, sides, interpolation=cv2.INTER_AREA) / 255
+    gray = cv2.GaussianBlur(150 + 180 * light, (0, 0), cell / 10)
+    noise = np.random.default_rng(5).normal(0, 1.5, gray.shape)
+    return np.clip(gray + noise, 0, 255).astype(np.uint8)
+
+
+@pytest.mark.parametrize('cell', [6, 8, 12])
+def test_markers_whose_paper_is_washed_out(cell):
+    detect = create_detector(family='apriltag_36h11')
+    read = [[it.id for it in detect(washed_out(number, cell))] for number in (6, 7, 100, 300)]
+    assert read == [[6], [7], [100], [300]]
+
+
+def test_not_fewer_markers_where_an_image_is_enlarged():
+    """What a half shows of a soft marker, a half of the half shows of one that is larger."""
+    detect, read = create_detector(family='apriltag_36h11'), np.zeros(2, int)
+    for seed in (2, 5, 6):
+        shown = scene('apriltag_36h11', targets=12, dot_radius=4.0, blur=1.0, seed=seed)
+        image = cv2.blur(shown.image, (4, 1))
+        larger = cv2.resize(image, None, fx=3, fy=3, interpolation=cv2.INTER_CUBIC)
+        ids = {it.id for it in shown.targets}
+        read += [len(ids & {it.id for it in detect(of)}) for of in (image, larger)]
+    assert read[1] >= read[0] > 15
+
+
 @pytest.mark.parametrize('gray', [0, 90, 255])
 def test_a_covered_marker_is_read(gray):
     shown = scene(family='apriltag_36h11')

@@ -27,10 +27,14 @@ from ahf_ros.features.pyramid import halved
 from ahf_ros.imaging.image import as_gray, check_image
 from ahf_ros.target import SquareMarker, Target, sorted_targets
 
-_DRAFT_DEVIATION = 0.028  # of a centre from contours where nothing else can be fitted, in sides
+# Of a centre from contours where nothing else can be fitted, in sides: on paper with waves of 0.5
+# to 3 px, 0.021 of 169 markers and 0.032 of 85, none beyond three of these. On flat and on bent
+# sheets, in any light, edges or print are fitted: of 2,133 markers none was left.
+_DRAFT_DEVIATION = 0.028
 _SMALL = 28.0  # diagonal of a marker whose cells are not much larger than pixels, px
 _SMALLEST_HALF = 24  # smaller side of a half that markers are looked for in, px
 _SAME_PLACE = 0.3  # distance of two readings of one marker, in sides
+_SURE = 7.0  # logarithmic odds of a marker that is looked for in no half: a thousand to one
 _FITTED = 4.0  # logarithmic odds against a marker whose print was laid: half its eight unknowns
 _SEVERAL = 4.0  # power of their number, one in which each of several groups is there
 _ALONE = 2.9  # ... one marker alone shows
@@ -80,10 +84,11 @@ class SquareDetector(FamilyDetector):
             small = np.linalg.norm(found[:, 2] - found[:, 0], axis=1) < _SMALL
             if level == 0:
                 found[small] = lay_outlines(half, found[small])
-            elif level == 1:  # where contours do as well, unless light or a lens spreads
+            else:  # where contours do as well, unless light, a lens or enlargement spreads
+                small &= ~_are_read(_enlarged(found, level), corners, readings)
                 found = np.concatenate([found, lay_outlines(half, found[small])])
             found, read_as = _read(half, found, groups)
-            corners.append((found + 0.5) * 2**level - 0.5)
+            corners.append(_enlarged(found, level))
             readings.append(read_as)
         places, rows = np.concatenate(corners), np.concatenate(readings)
         found, read_as = _read(gray, _laid(gray, places, rows, groups), groups)
@@ -151,6 +156,22 @@ def _read(gray: np.ndarray, corners: np.ndarray, groups: Groups) -> tuple[np.nda
     turned = (np.arange(4) - found.turn[:, None]) % 4
     columns = (found.group, found.number, found.border, found.odds, found.others)
     return corners[found.quadrilateral[:, None], turned], np.stack(columns, axis=1)
+
+
+def _enlarged(corners: np.ndarray, level: int) -> np.ndarray:
+    """Return corners in an image halved so often as they are in the image."""
+    return (corners + 0.5) * 2**level - 0.5
+
+
+def _are_read(
+    places: np.ndarray, corners: Sequence[np.ndarray], readings: Sequence[np.ndarray]
+) -> np.ndarray:
+    """Return which quadrilaterals, shape (k, 4, 2), are where a marker was surely read, (k,)."""
+    sure = np.concatenate(corners)[np.concatenate(readings)[:, 3] > _SURE]
+    distances = np.linalg.norm(places.mean(axis=1)[:, None] - sure.mean(axis=1), axis=2)
+    near = distances <= _SAME_PLACE * side_lengths(places).max(axis=1)[:, None]
+    read_before: np.ndarray = near.any(axis=1)
+    return read_before
 
 
 def _laid(
@@ -247,7 +268,7 @@ def _from_halves(gray: np.ndarray, corners: np.ndarray, ink: np.ndarray) -> np.n
         which = np.flatnonzero(sides > _LARGE * 2 ** (level - 1))
         fit = fit_edges(halves[level], reduced(corners[which], level), ink[which])
         good = fit.share > 0
-        corners[which[good]] = (fit.corners[good] + 0.5) * 2**level - 0.5
+        corners[which[good]] = _enlarged(fit.corners[good], level)
     return corners
 
 

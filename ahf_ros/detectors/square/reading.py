@@ -29,12 +29,16 @@ from ahf_ros.features.frame import project
 from ahf_ros.features.sampling import sample
 from ahf_ros.imaging.logarithm import LOG_OFFSET
 
-_IN_CELL = (-0.2, 0.2)  # where a cell is sampled, from its centre, in cells
+_IN_CELL = ((0.0, 0.0), (-0.2, -0.2), (-0.2, 0.2), (0.2, -0.2), (0.2, 0.2))
+"""Where a cell is sampled, from its centre, in cells."""
+
 _CORNER = 0.3  # from a corner of the border, in cells
 _OUTERMOST = (1, 3, 2, 4)  # of the whole cell and its parts, those at the corners
 _BLURS = 0.7, 0.4  # of a usual image and of a sharp one, standard deviations in px
 _SMALL_CELL = 2.0  # below which they differ, px
 _SMALLEST_CELL = 1.0  # that can be read, px
+_LARGE_CELL = 4.0  # whose middle stays dark where light spreads over ink, px
+_SPREADS = 3.0  # logarithmic odds against an image in which it does
 _MOST_MIXED = 0.2  # share that a cell takes from each neighbour, at most
 _REACH = 0.25  # standard deviation of the window that levels are taken from, in sides
 _MINIMUM_STEP = 0.35  # from ink to paper, in the logarithm
@@ -190,26 +194,25 @@ def _evidence(
 
     It is by how much the logarithmic odds of a marker grow where a cell is paper, shape
     (k, cells^2), what they are where all cells are ink, (k,), and those of square corners, (k,).
-    Those with small cells are there twice, once as in a sharp image.
+    Those with small cells are there twice, once as in a sharp image, and those with large cells
+    once by the darkest part of each, as where light has spread from paper over ink.
     """
     side = cells + 2 * border
     places = (np.arange(side + 2) - (side + 1) / 2) / side
-    grid = np.stack(np.meshgrid(places, places), axis=-1)
-    size = side + 2
-    parts = np.array(
-        [
-            sample(
-                gray, project(frames, grid + np.array([x, y]) / side).reshape(len(frames), -1, 2)
-            )
-            for x in _IN_CELL
-            for y in _IN_CELL
-        ],
-        np.float64,
-    ).reshape(-1, len(frames), size, size)
+    grid = np.stack(np.meshgrid(places, places), axis=-1).reshape(-1, 2)
+    points = project(frames, grid + np.array(_IN_CELL)[:, None] / side)
+    parts = sample(gray, points).astype(np.float64).swapaxes(0, 1)
+    parts = parts.reshape(len(_IN_CELL), len(frames), side + 2, side + 2)
     small = np.flatnonzero(sizes < _SMALL_CELL * side)
-    tried = np.concatenate([np.arange(len(frames)), small])
-    blurs = np.repeat(_BLURS, [len(frames), len(small)])
-    whole = _unmixed(parts.mean(axis=0)[tried], corners[tried], side, blurs)
+    large = np.flatnonzero(sizes >= _LARGE_CELL * side)
+    tried = np.concatenate([np.arange(len(frames)), small, large])
+    blurs, spreads = np.repeat(
+        [[*_BLURS, _BLURS[0]], [0.0, 0.0, _SPREADS]], [len(frames), len(small), len(large)], axis=1
+    )
+    darkest, parts = parts.min(axis=0), parts[1:]
+    whole = parts.mean(axis=0)[tried]
+    whole[spreads > 0] = darkest[large]
+    whole = _unmixed(whole, corners[tried], side, blurs)
     logs = np.log(parts + LOG_OFFSET).reshape(len(parts), len(frames), -1)[:, tried]
     values = np.log(np.maximum(whole, 0) + LOG_OFFSET)
     rings = _rings(cells, border)
@@ -238,7 +241,8 @@ def _evidence(
     bright = (np.exp(outermost - middle) - np.exp(-step / 2)) / (2 * np.sinh(step / 2))
     depths = _CORNER * _cell_sizes(corners[tried[which]], side) / blurs[which, None]
     square = np.clip(corner_odds(bright, depths, _SHARPNESS), -_COVERED, _COVERED).sum(axis=1)
-    return paper.astype(np.float32), inside, square, tried[which]
+    rare = spreads[which]
+    return paper.astype(np.float32), inside - rare, square - rare, tried[which]
 
 
 @dataclass(frozen=True, slots=True)
