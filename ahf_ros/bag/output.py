@@ -26,6 +26,7 @@ from ahf_ros.bag.definitions import CODED_TARGETS, COMPRESSED_IMAGE, typestore
 from ahf_ros.bag.mcap_records import add_checksums
 from ahf_ros.bag.source import METADATA, Source, read_metadata
 from ahf_ros.filtering.identifier import Memory
+from ahf_ros.writing import place, write_whole
 
 JOURNAL = 'unfinished.sqlite'
 
@@ -222,7 +223,7 @@ def write_bag(
     _set_custom_data(bag / METADATA, source.metadata.custom | own)
     for file in sorted(bag.iterdir(), key=lambda file: file.name == METADATA):
         # The metadata last: they say that the bag is finished.
-        file.replace(output / file.name)
+        place(file, output / file.name)
     return outcome
 
 
@@ -252,7 +253,7 @@ def _set_custom_data(path: Path, custom: dict[str, str]) -> None:
     content['rosbag2_bagfile_information']['custom_data'] = custom
     text = json.dumps(content, indent=1, ensure_ascii=False)  # YAML joins no surrogates
     escaped = _UNPRINTABLE.sub(lambda found: f'\\u{ord(found[0]):04x}', text)
-    path.write_text(escaped, encoding='utf-8')
+    write_whole(path, escaped.encode())
 
 
 def _write(

@@ -41,12 +41,12 @@ from ahf_ros.bag.registration import RegistrationTask, check_registration
 from ahf_ros.bag.source import METADATA, Message, Source
 from ahf_ros.detectors import create_detector
 from ahf_ros.drawing.overlay import draw
-from ahf_ros.interchange.files import locked
 from ahf_ros.interchange.target_messages import coded_target_array
 from ahf_ros.session_settings import IdentificationSettings, StackSettings
 from ahf_ros.settings.nested import flat_values
 from ahf_ros.settling import settled_families
 from ahf_ros.stream import Answer, Frame, Kind, Remark, Stream, message_frame, refusal
+from ahf_ros.writing import locked
 
 WRITING_ERRORS = (OSError, sqlite3.Error, WriterError)
 """Errors of writing a bag, such as a full disk or a folder without permission."""

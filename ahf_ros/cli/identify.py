@@ -28,10 +28,13 @@ from ahf_ros.cli.options import (
     add_output_options,
     add_search_options,
     add_target_options,
+    input_name,
+    output_path,
     settings_from,
 )
 from ahf_ros.codes.families import AUTO
 from ahf_ros.doubt import doubtful_remark
+from ahf_ros.inputs import check_output, register_input
 from ahf_ros.interchange.files import RESULTS_FILE, is_url, read_text, urls_named
 from ahf_ros.session_settings import IdentificationSettings, StackSettings
 from ahf_ros.settings.parameter import parameters
@@ -51,6 +54,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         'images',
         nargs='+',
+        type=input_name,
         metavar='IMAGE',
         help='Image files; folders, for their images; patterns in quotation marks, such as '
         '"day*/*.jpg" or "**/*.tif"; URLs of storages that fsspec reads, such as s3:// and '
@@ -61,7 +65,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     output = parser.add_argument_group('output')
     output.add_argument(
         '--output',
-        type=Path,
+        type=output_path,
         metavar='DIR',
         help=f'Write results to {RESULTS_FILE} in this folder as they come. The same command '
         'again goes on where it was interrupted; files that have changed, and all with other '
@@ -260,10 +264,13 @@ def _tasks(
     jobs = min(jobs, len(groups))
     settings = shared_settings(settings, jobs, options.scheduler)
     stacking = StackSettings(stack=options.stack, stack_movement=options.stack_movement)
-    if options.overlay and len(set(_overlay_paths(options, set(paths)))) < len(set(paths)):
+    overlays = set(_overlay_paths(options, set(paths)))
+    if options.overlay and len(overlays) < len(set(paths)):
         raise ValueError(
             'overlay would hold several images of the same name, accepted are different names'
         )
+    for overlay in overlays:  # here, since processes know their own images only
+        check_output(overlay)
     return jobs, [
         image_task(
             options,
@@ -342,6 +349,8 @@ def image_paths(arguments: Sequence[str]) -> tuple[list[str], list[str]]:
         if not found:
             problems.append(f'{shown(argument)} names no image, accepted are files and folders')
         paths += found
+    for path in paths:
+        register_input(path)
     return paths, problems
 
 

@@ -16,6 +16,8 @@ from ahf_ros.cli.options import (
     add_registration_options,
     add_search_options,
     add_target_options,
+    input_path,
+    output_path,
     settings_from,
 )
 from ahf_ros.cloud_settings import CloudSettings
@@ -34,7 +36,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Give a parser the arguments of the command."""
     parser.add_argument(
         'folder',
-        type=Path,
+        type=input_path,
         metavar='FOLDER',
         help='Folder of organised clouds, PLY or PCD in metres, one point per pixel of an image '
         'of the same name.',
@@ -42,7 +44,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         '-o',
         '--output',
-        type=Path,
+        type=output_path,
         required=True,
         metavar='DIR',
         help='Write clouds in the frame, transforms and targets to this folder, as the service '

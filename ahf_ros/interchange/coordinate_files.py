@@ -17,6 +17,7 @@ from ahf_ros.orientation.network import ControlPoint
 from ahf_ros.orientation.points import MeasuredPoints
 from ahf_ros.orientation.units import METRES
 from ahf_ros.text import shown
+from ahf_ros.writing import complete
 
 _COLUMNS = ('id', 'x', 'y', 'z')
 
@@ -30,6 +31,7 @@ def read_coordinates(path: str | Path, unit: str = '') -> MeasuredPoints:
     does not say it. A ValueError names what is missing, damaged, or contradicts the unit.
     """
     file = Path(path)
+    complete(file.parent)
     if file.is_dir() or file.suffix.lower() == '.json':
         content = None if file.is_dir() else parsed_json(read_text(file), str(file))
         if not isinstance(content, dict) or 'covariance_of_points' in content:

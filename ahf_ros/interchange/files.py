@@ -7,91 +7,26 @@ from __future__ import annotations
 
 import csv
 import io
-import os
 import re
-import sqlite3
 import stat
-import time
-from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
-from contextlib import contextmanager, suppress
-from importlib import import_module
+from collections.abc import Collection, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path, PurePath
-from typing import Any, BinaryIO
+from typing import Any
 
 from ahf_ros.extras import need
+from ahf_ros.inputs import register_input
+from ahf_ros.opening import file_errors
 from ahf_ros.text import printable, reason_of, shown
-
-_fcntl: Any
-try:
-    _fcntl = import_module('fcntl')
-except ImportError:  # on Windows
-    _fcntl = None
 
 RESULTS_FILE = 'results.jsonl'
 """Name of the file in a folder that `ahf identify --output` writes."""
 
-_LOCK_FILE = '.lock'
 _APOSTROPHE = "'"
 _FORMULA = frozenset('=+-@')  # how a formula begins; tabs and line ends are escaped
-_TRY_LOCK = 0.1  # s between two attempts
 _URL = re.compile(r'[a-z][a-z0-9+.-]*://', re.IGNORECASE)
 _CHANGED = ('mtime', 'LastModified', 'last_modified', 'updated', 'ETag', 'created')
 """What storages call the time of the last change, or what stands for it."""
-
-
-@contextmanager
-def file_errors(path: str | Path, action: str) -> Iterator[None]:
-    """Turn errors of the operating system into a ValueError: the file 'cannot be' `action`."""
-    try:
-        yield
-    except OSError as error:
-        raise ValueError(f'{path} cannot be {action}: {error.strerror}') from error
-
-
-@contextmanager
-def locked(folder: str | Path, lock_timeout: float = 0.0) -> Iterator[None]:
-    """Lock a folder against other processes, until this process ends at the latest.
-
-    Raises a ValueError if another process still has locked it after `lock_timeout` s.
-    """
-    limit = time.monotonic() + lock_timeout
-    with _lock_of(folder) as try_lock:
-        while not try_lock():
-            if time.monotonic() >= limit:
-                raise ValueError(f'{folder} is being written by another process')
-            time.sleep(_TRY_LOCK)
-        yield
-
-
-@contextmanager
-def _lock_of(folder: str | Path) -> Iterator[Callable[[], bool]]:
-    """Yield what tries to lock a folder and returns whether it could."""
-    if _fcntl is None:  # folders cannot be locked; a database can, by any process
-        database = sqlite3.connect(Path(folder, _LOCK_FILE), timeout=0, isolation_level=None)
-
-        def locked_database() -> bool:
-            with suppress(sqlite3.OperationalError):
-                database.execute('BEGIN EXCLUSIVE')
-                return True
-            return False
-
-        try:
-            yield locked_database
-        finally:
-            database.close()
-        return
-    descriptor = os.open(folder, os.O_RDONLY)
-
-    def locked_folder() -> bool:
-        with suppress(BlockingIOError):
-            _fcntl.flock(descriptor, _fcntl.LOCK_EX | _fcntl.LOCK_NB)
-            return True
-        return False
-
-    try:
-        yield locked_folder
-    finally:
-        os.close(descriptor)
 
 
 def read_bytes(path: str | Path) -> bytes:
@@ -99,6 +34,7 @@ def read_bytes(path: str | Path) -> bytes:
     if is_url(str(path)):
         with _storage(str(path)) as (storage, place):
             return bytes(storage.cat_file(place))
+    register_input(path)
     with file_errors(path, 'read'):
         return Path(path).read_bytes()
 
@@ -131,12 +67,6 @@ def checked_file_name(value: Any, name: str) -> str:
     if not isinstance(value, str) or not PurePath(value).name:
         raise ValueError(f'{name} is {shown(value)}, accepted is the name of a file')
     return PurePath(value).name
-
-
-def write_whole(path: str | Path, content: bytes) -> None:
-    """Write a file that is never there in part, as `whole_file` does."""
-    with whole_file(path) as file:
-        file.write(content)
 
 
 def csv_table(rows: Iterable[Sequence[object]]) -> bytes:
@@ -178,33 +108,6 @@ def _is_formula(text: str) -> bool:
     except ValueError:
         return True
     return False
-
-
-@contextmanager
-def whole_file(path: str | Path) -> Iterator[BinaryIO]:
-    """Open a file to write that is never there in part, whatever fails.
-
-    An existing file is replaced once the new one is complete, a missing folder is created. What
-    is no ordinary file, such as a pipe, is written to directly. A ValueError names a file that
-    cannot be written.
-    """
-    with file_errors(path, 'written'):
-        final = Path(path).resolve()
-        if final.exists() and not final.is_file():
-            with final.open('wb') as file:
-                yield file
-            return
-        final.parent.mkdir(parents=True, exist_ok=True)
-        part = final.with_name(f'.{final.name[:200]}.{os.getpid()}.part')
-        part.unlink(missing_ok=True)  # of a killed process of that number, as in containers
-        try:
-            with part.open('xb') as file:
-                yield file
-                file.flush()
-                os.fsync(file.fileno())
-            part.replace(final)
-        finally:
-            part.unlink(missing_ok=True)
 
 
 def is_url(name: str) -> bool:

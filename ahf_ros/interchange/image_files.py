@@ -20,7 +20,8 @@ from ahf_ros.deprecation import deprecated_arguments
 from ahf_ros.imaging.image import check_size
 from ahf_ros.imaging.tiff import first_directory, is_tiff
 from ahf_ros.imaging.whole import decoded
-from ahf_ros.interchange.files import check_regular, read_bytes, write_whole
+from ahf_ros.interchange.files import check_regular, read_bytes
+from ahf_ros.writing import write_whole
 
 SUFFIXES = ('.bmp', '.jpeg', '.jpg', '.png', '.tif', '.tiff')
 """Endings of the image files that are tested; others are tried."""

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import io
-import json
 import math
 import zipfile
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from ahf_ros.interchange.camera_files import FISHEYE, opencv_yaml, ros_yaml
-from ahf_ros.interchange.files import csv_table, read_bytes, read_text, write_whole
+from ahf_ros.interchange.files import csv_table, read_bytes, read_text
 from ahf_ros.interchange.target_json import parsed_json
 from ahf_ros.orientation.camera import EQUIDISTANT, PARAMETERS, parameters_of
 from ahf_ros.orientation.deviations import bar_deviations, control_deviations
@@ -25,6 +24,7 @@ from ahf_ros.orientation.solution import Solution
 from ahf_ros.orientation.strength import rays_of
 from ahf_ros.orientation.transform import Transform
 from ahf_ros.text import shown
+from ahf_ros.writing import check_set, complete, write_set
 
 NETWORK_FILE = 'network.json'
 POINTS_FILE = 'points.csv'
@@ -61,11 +61,15 @@ class OrientedNetwork:
     warnings: tuple[str, ...]
 
 
-def network_files(solution: Solution) -> dict[str, bytes]:
-    """Return network.json, points.csv and the covariance of all points, by the names of the files.
+def write_network(
+    folder: str | Path, solution: Solution, beside: Mapping[str, bytes] | None = None
+) -> tuple[Path, ...]:
+    """Write an adjusted network to a folder as a set of files, and return the paths.
 
-    Photographs and targets that could not be determined are left out, and named in the warnings.
-    A ValueError is raised for a solution with backward distortion.
+    These are network.json, points.csv and the covariance of all points; calibrations, poses,
+    residuals and checks; and what is `beside` them. Photographs and targets that could not be
+    determined are left out, and named in the warnings. A ValueError is raised for a solution with
+    backward distortion.
     """
     solution.check_forward()
     network, values = solution.network, solution.start
@@ -101,28 +105,15 @@ def network_files(solution: Solution) -> dict[str, bytes]:
         ],
         'warnings': [*solution.warnings, *_left_out(solution)],
     }
-    return {
-        NETWORK_FILE: json.dumps(record, indent=1, allow_nan=False).encode() + b'\n',
-        POINTS_FILE: _points_table(points, rays),
-        COVARIANCE_FILE: _archive(points),
-    }
+    files = {POINTS_FILE: _points_table(points, rays), COVARIANCE_FILE: _archive(points)}
+    files |= calibration_files(solution) | tables(solution) | dict(beside or {})
+    return write_set(folder, NETWORK_FILE, record, files.items())
 
 
 def rejections(solution: Solution) -> list[Rejection]:
     """Return what was set aside from the start, and what the adjustment rejected."""
     aside = [it for it in solution.network.set_aside if it not in solution.rejected]
     return [*aside, *solution.rejected]
-
-
-def write_network(folder: str | Path, solution: Solution) -> tuple[Path, ...]:
-    """Write an adjusted network to a folder, each file as a whole, and return the paths.
-
-    These are `network_files`, and calibrations, poses, residuals and checks.
-    """
-    files = network_files(solution) | calibration_files(solution) | tables(solution)
-    for name, content in files.items():
-        write_whole(Path(folder) / name, content)
-    return tuple(Path(folder) / name for name in files)
 
 
 def _cameras(solution: Solution) -> list[dict[str, Any]]:
@@ -191,12 +182,14 @@ def _archive(points: MeasuredPoints) -> bytes:
 def read_network(folder: str | Path) -> OrientedNetwork:
     """Return the network that `ahf orient` wrote to a folder, or whose network.json is named.
 
-    A ValueError names what is missing, damaged, or of another version.
+    A ValueError names what is missing, damaged, or of another version or run.
     """
     path = Path(folder) / NETWORK_FILE if Path(folder).is_dir() else Path(folder)
+    complete(path.parent)
     content = parsed_json(read_text(path), str(path))
     record = _Record(content, str(path))
     points = record.rows('points')
+    check_set(path, content)
     names = tuple(it.text('id') for it in points)
     if twice := [name for name, number in Counter(names).items() if number > 1]:
         raise ValueError(f'{path}: points have {twice[0]!r} twice, accepted is one point an id')

@@ -7,16 +7,11 @@ import math
 from pathlib import Path
 from typing import Any
 
-from ahf_ros.interchange.files import (
-    checked_file_name,
-    csv_table,
-    csv_text,
-    read_text,
-    write_whole,
-)
+from ahf_ros.interchange.files import checked_file_name, csv_table, csv_text, read_text
 from ahf_ros.target import UNDECODED, TrueTarget, Truth
 from ahf_ros.target_check import MAXIMUM_ID, MAXIMUM_LENGTH_PX
 from ahf_ros.text import shown
+from ahf_ros.writing import write_whole
 
 _LIMITS = {
     'id': (UNDECODED, MAXIMUM_ID),

@@ -25,7 +25,6 @@ from ahf_ros.doubt import DOUBTFUL_BELOW, doubt
 from ahf_ros.edge_shift import edge_shift_remark
 from ahf_ros.evaluation import FALSE, RIGHT, WRONG, judge
 from ahf_ros.extras import need
-from ahf_ros.interchange.files import whole_file
 from ahf_ros.report.images import Picture, fitted, shown_image, thumbnail
 from ahf_ros.report.results import ImageResult
 from ahf_ros.settings.parameter import check_parameters, parameter
@@ -40,6 +39,7 @@ from ahf_ros.target import (
     count_codes,
 )
 from ahf_ros.text import printable, reason_of
+from ahf_ros.writing import whole_file
 
 _PAGE = Path(__file__).parent / 'page'  # the template, and the styles and scripts that it holds
 _SCRIPTS = ('data', 'table', 'viewer', 'plots', 'details', 'overview', 'main')  # in their order

@@ -204,6 +204,7 @@ def test_networks_that_cannot_be_compared_are_named(
     shutil.copytree(folder / 'second', other)
     file = other / 'network.json'
     record = json.loads(file.read_text())
+    del record['files']  # as in earlier versions
     if damage == 'covariance':
         (other / 'covariance_of_points.npz').unlink()
     elif damage == 'names':

@@ -19,7 +19,8 @@ from ahf_ros.orientation.solution import Solution
 from support.networks import solution
 
 KEYS = {
-    '': 'sigma0 redundancy unit cameras images points covariance_of_points rejected warnings',
+    '': 'sigma0 redundancy unit cameras images points covariance_of_points rejected warnings '
+    'files',
     'cameras': 'name width height fx fy cx cy distortion_model distortion covariance',
     'images': 'image camera rotation position covariance',
     'points': 'id x y z rays',
@@ -133,6 +134,9 @@ def test_a_damaged_network_is_named(tmp_path: Path, name: str) -> None:
 
 def test_a_covariance_that_is_none_is_named(tmp_path: Path) -> None:
     write_network(tmp_path, solution())
+    record = json.loads((tmp_path / 'network.json').read_text())
+    del record['files']  # as in earlier versions
+    (tmp_path / 'network.json').write_text(json.dumps(record))
     path = tmp_path / 'covariance_of_points.npz'
     path.write_bytes(b'')
     with pytest.raises(ValueError, match='damaged'):
