@@ -92,8 +92,11 @@ def write_files(
             with suppress(OSError):  # there are file systems without locks
                 lock.enter_context(locked(root, _LOCK_TIMEOUT))
             complete(root)
-            write_whole(root / _MOVES, json.dumps(moves).encode())
-            parts.pop_all()  # the set is as good as there
+            try:
+                write_whole(root / _MOVES, json.dumps(moves).encode())
+            finally:
+                if (root / _MOVES).exists():
+                    parts.pop_all()  # the set is as good as there
             complete(root)
     return tuple(Path(folder, name) for name in names)
 

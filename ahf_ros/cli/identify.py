@@ -264,13 +264,10 @@ def _tasks(
     jobs = min(jobs, len(groups))
     settings = shared_settings(settings, jobs, options.scheduler)
     stacking = StackSettings(stack=options.stack, stack_movement=options.stack_movement)
-    overlays = set(_overlay_paths(options, set(paths)))
-    if options.overlay and len(overlays) < len(set(paths)):
+    if options.overlay and len(set(_overlay_paths(options, set(paths)))) < len(set(paths)):
         raise ValueError(
             'overlay would hold several images of the same name, accepted are different names'
         )
-    for overlay in overlays:  # here, since processes know their own images only
-        check_output(overlay)
     return jobs, [
         image_task(
             options,
@@ -292,6 +289,8 @@ def image_task(
 ) -> ImageTask:
     """Return the task of images that are identified together, with more fields of it."""
     paths = tuple(paths)
+    for path in paths:
+        register_input(path)
     return ImageTask(
         paths=paths,
         settings=settings,
@@ -306,7 +305,10 @@ def _overlay_paths(options: argparse.Namespace, images: Iterable[str]) -> tuple[
     """Return the files that images are drawn to; none if there is no folder for them."""
     if options.overlay is None:
         return ()
-    return tuple(str(options.overlay / f'{Path(it).stem}_overlay.png') for it in images)
+    paths = tuple(str(options.overlay / f'{Path(it).stem}_overlay.png') for it in images)
+    for path in paths:  # here, since another process knows its own images only
+        check_output(path)
+    return paths
 
 
 def _outcomes(
@@ -349,8 +351,8 @@ def image_paths(arguments: Sequence[str]) -> tuple[list[str], list[str]]:
         if not found:
             problems.append(f'{shown(argument)} names no image, accepted are files and folders')
         paths += found
-    for path in paths:
-        register_input(path)
+        for path in found:
+            register_input(path)
     return paths, problems
 
 

@@ -14,7 +14,7 @@ from ahf_ros.batch.task import ImageTask, with_machine
 from ahf_ros.batch.watch import Arrivals, watch
 from ahf_ros.cli import tell
 from ahf_ros.cli.engines import create_engine, shared_settings
-from ahf_ros.cli.identify import check_settings, image_task, print_outcome
+from ahf_ros.cli.identify import check_settings, image_paths, image_task, print_outcome
 from ahf_ros.cli.options import (
     add_image_options,
     add_option,
@@ -63,6 +63,7 @@ def run(options: argparse.Namespace) -> int:
     output = sys.stdout if options.json else None
     settings = settings_from(options, IdentificationSettings, [options.folder / 'families'])
     _check_overlay(options)
+    image_paths([str(options.folder)])  # which are inputs from now on
     jobs = options.jobs or available_cores()
     shared = shared_settings(settings, jobs, options.scheduler)
 
