@@ -34,7 +34,8 @@ LINES = {
     '--output out --overlay drawn --export csv=csv',
     'watch': 'watch photos --family-file gsi.json --output out --overlay drawn --settling 0',
     'bag': 'bag in.mcap out --register registered --family-file gsi.json --coordinates wall.csv',
-    'render': 'render out --family gsi --family-file gsi.json --targets 1 --width 320 --height 240',
+    'render': 'render out --family gsi --family-file gsi.json --targets 1 --dot-radius 5 '
+    '--width 400 --height 400',
     'evaluate': '',
     'export': 'export results.jsonl csv=csv --control points.csv',
     'report': 'report results.jsonl -o page.html --images photos --truth truth.csv',
