@@ -10,6 +10,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import sys
 import time
 from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
@@ -22,7 +23,8 @@ from ahf_ros.batch.engine import Engine, Finished, TaskFailed, finished_tasks, i
 from ahf_ros.batch.identification import file_fingerprint, files_digest
 from ahf_ros.batch.task import ImageOutcome, ImageTask, Level, Message
 from ahf_ros.inputs import check_output
-from ahf_ros.interchange.files import RESULTS_FILE, file_errors
+from ahf_ros.interchange.files import RESULTS_FILE
+from ahf_ros.opening import check_regular, file_errors
 from ahf_ros.release import release
 from ahf_ros.settings.nested import flat_values
 from ahf_ros.writing import locked, whole_file
@@ -78,6 +80,8 @@ class Results:
                 folder.mkdir(parents=True, exist_ok=True)
                 opened.enter_context(locked(folder))
                 check_output(self.path)
+                if self.path.exists():
+                    check_regular(self.path, sys.maxsize)
                 self._file = self.path.open('a+b', buffering=0)
             opened.callback(lambda: self._file.close())
             self._read()

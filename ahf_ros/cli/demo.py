@@ -19,8 +19,8 @@ from ahf_ros.drawing.overlay import (
 from ahf_ros.drawing.tiles import Tile, side_by_side
 from ahf_ros.evaluation import FALSE, RIGHT, WRONG, judge, line, method
 from ahf_ros.filtering.homomorphic import filtered
-from ahf_ros.interchange.files import file_errors
 from ahf_ros.interchange.image_files import write_image
+from ahf_ros.opening import file_errors
 from ahf_ros.session import create_identifier
 from ahf_ros.settings.parameter import Parameter
 from ahf_ros.synthetic.patterns import LIGHT_NAMES

@@ -100,9 +100,9 @@ def control_from(options: argparse.Namespace) -> Control | None:
     if options.control is None:
         return None
     from ahf_ros.interchange.export.survey import Control
-    from ahf_ros.interchange.point_lists import read_point_list
+    from ahf_ros.interchange.tables import read_points
 
-    points = read_point_list(options.control)
+    points = read_points(options.control)
     return Control(points, options.control_crs.strip(), options.control_sigma)
 
 

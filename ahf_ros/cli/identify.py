@@ -35,7 +35,8 @@ from ahf_ros.cli.options import (
 from ahf_ros.codes.families import AUTO
 from ahf_ros.doubt import doubtful_remark
 from ahf_ros.inputs import check_output, register_input
-from ahf_ros.interchange.files import RESULTS_FILE, is_url, read_text, urls_named
+from ahf_ros.interchange.files import RESULTS_FILE
+from ahf_ros.opening import Most, is_url, read_text, urls_named
 from ahf_ros.session_settings import IdentificationSettings, StackSettings
 from ahf_ros.settings.parameter import parameters
 from ahf_ros.target import UNDECODED
@@ -367,7 +368,7 @@ def _named(argument: str) -> Iterator[str]:
     elif path.exists():
         yield argument
     elif argument.startswith('@'):
-        for line in read_text(argument[1:]).splitlines():
+        for line in read_text(argument[1:], Most.TABLE).splitlines():
             if line.strip():
                 yield from _named(line.strip())
     elif has_magic(argument):

@@ -209,12 +209,12 @@ def _contact_sheet(learnt: LearntFamily, crops: dict[bytes, np.ndarray]) -> np.n
 def _learn_points(options: argparse.Namespace, points: str) -> int:
     from ahf_ros.codes.gsi import point_family
     from ahf_ros.codes.gsi_learning import learn_family, library_text, with_codes
-    from ahf_ros.interchange.point_lists import read_point_list
+    from ahf_ros.interchange.tables import read_points
 
     radius = options.dot_radius
     base = point_family(options.base)
     name = options.name or options.output.stem
-    learnt = learn_family(read_point_list(points), base, name)
+    learnt = learn_family(read_points(points), base, name)
     family = replace(learnt.family, unit=options.unit, source=Path(points).name)
     if radius is not None:
         family = replace(

@@ -143,7 +143,7 @@ def _check(options: argparse.Namespace) -> None:
 def _measured(options: argparse.Namespace, points: MeasuredPoints) -> _Measured:
     """Return distances, deviations and the test of lengths, as far as they are asked for."""
     from ahf_ros.interchange.control_files import read_lengths
-    from ahf_ros.interchange.point_lists import read_point_list
+    from ahf_ros.interchange.tables import read_points
     from ahf_ros.orientation.measurement import deviations, distances, length_errors
 
     far: list[Distance] = []
@@ -151,7 +151,7 @@ def _measured(options: argparse.Namespace, points: MeasuredPoints) -> _Measured:
         far = distances(points, options.distance or None)
     off: list[Deviation] = []
     if options.nominal:
-        nominal = read_point_list(options.nominal)
+        nominal = read_points(options.nominal)
         off = deviations(_aligned(options, points, nominal), nominal)
     test = None
     if options.lengths:

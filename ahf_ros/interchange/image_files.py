@@ -20,14 +20,11 @@ from ahf_ros.deprecation import deprecated_arguments
 from ahf_ros.imaging.image import check_size
 from ahf_ros.imaging.tiff import first_directory, is_tiff
 from ahf_ros.imaging.whole import decoded
-from ahf_ros.interchange.files import check_regular, read_bytes
+from ahf_ros.opening import Most, read_bytes, reader
 from ahf_ros.writing import write_whole
 
 SUFFIXES = ('.bmp', '.jpeg', '.jpg', '.png', '.tif', '.tiff')
 """Endings of the image files that are tested; others are tried."""
-
-MAXIMUM_BYTES = 2**31 - 1
-"""Bytes that an image file may have; OpenCV counts them as an int."""
 
 UPRIGHT = 1
 """Orientation of an image whose first row is the upper one and whose first column is the left."""
@@ -90,10 +87,10 @@ def read_image(path: str | Path, *, upright: bool = False) -> np.ndarray:
     return read_noted_image(path, upright=upright).image
 
 
+@reader('an image')
 def read_noted_image(path: str | Path, *, upright: bool = False) -> NotedImage:
     """Return an image as `read_image` does, with what there is to say about its file."""
-    check_regular(path, MAXIMUM_BYTES)
-    noted = _decoded(read_bytes(path), str(path))
+    noted = _decoded(read_bytes(path, Most.IMAGE), str(path))
     if not UPRIGHT < noted.orientation <= _LAST_ORIENTATION:  # cameras write 0 for none
         return noted
     if upright:

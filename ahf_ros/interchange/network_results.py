@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 import math
-import zipfile
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -13,9 +12,10 @@ from typing import Any
 
 import numpy as np
 
+from ahf_ros.interchange.arrays import read_arrays
 from ahf_ros.interchange.camera_files import FISHEYE, opencv_yaml, ros_yaml
-from ahf_ros.interchange.files import csv_table, read_bytes, read_text
-from ahf_ros.interchange.target_json import parsed_json
+from ahf_ros.interchange.files import csv_table
+from ahf_ros.opening import LARGEST, Most, inside, parsed_json, read_text, reader
 from ahf_ros.orientation.camera import EQUIDISTANT, PARAMETERS, parameters_of
 from ahf_ros.orientation.deviations import bar_deviations, control_deviations
 from ahf_ros.orientation.network import CameraView, FloatArray, IntArray, Rejection
@@ -23,6 +23,7 @@ from ahf_ros.orientation.points import MeasuredPoints, blocks, standard_deviatio
 from ahf_ros.orientation.solution import Solution
 from ahf_ros.orientation.strength import rays_of
 from ahf_ros.orientation.transform import Transform
+from ahf_ros.target_check import MAXIMUM_ID, checked_integer, checked_number
 from ahf_ros.text import shown
 from ahf_ros.writing import check_set, complete, write_set
 
@@ -179,14 +180,15 @@ def _archive(points: MeasuredPoints) -> bytes:
     return file.getvalue()
 
 
+@reader('what ahf orient of this version writes')
 def read_network(folder: str | Path) -> OrientedNetwork:
     """Return the network that `ahf orient` wrote to a folder, or whose network.json is named.
 
     A ValueError names what is missing, damaged, or of another version or run.
     """
-    path = Path(folder) / NETWORK_FILE if Path(folder).is_dir() else Path(folder)
+    path = inside(Path(folder), NETWORK_FILE) if Path(folder).is_dir() else Path(folder)
     complete(path.parent)
-    content = parsed_json(read_text(path), str(path))
+    content = parsed_json(read_text(path, Most.JSON), str(path))
     record = _Record(content, str(path))
     points = record.rows('points')
     check_set(path, content)
@@ -200,22 +202,19 @@ def read_network(folder: str | Path) -> OrientedNetwork:
         if it.text('camera') not in numbers:
             raise ValueError(f'{it.where}: camera is {shown(it.text("camera"))}, not in cameras')
     xyz = _stacked([[it.number(axis) for axis in 'xyz'] for it in points], (3,))
-    archive = path.parent / record.text('covariance_of_points')
+    archive = inside(path.parent, record.text('covariance_of_points'))
     covariance, scaled = _covariance_of(archive, names)
-    sigma0, redundancy = record.number('sigma0'), int(record.number('redundancy'))
-    try:
-        unit = record.text('unit')
-        measured = MeasuredPoints(names, xyz, covariance, sigma0, redundancy, unit, scaled)
-    except ValueError as error:
-        raise ValueError(f'{path}: {error}') from error
+    sigma0, redundancy = record.number('sigma0'), record.integer('redundancy')
+    unit = record.text('unit')
+    measured = MeasuredPoints(names, xyz, covariance, sigma0, redundancy, unit, scaled)
     return OrientedNetwork(
         points=measured,
-        rays=np.array([int(it.number('rays')) for it in points], np.int64),
+        rays=np.array([it.integer('rays') for it in points], np.int64),
         cameras=tuple(
             CameraView(
                 it.text('name'),
-                int(it.number('width')),
-                int(it.number('height')),
+                it.integer('width'),
+                it.integer('height'),
                 equidistant=_is_equidistant(it),
             )
             for it in cameras
@@ -266,22 +265,15 @@ def _stacked(rows: Sequence[Any], shape: tuple[int, ...]) -> FloatArray:
 
 def _covariance_of(path: Path, names: tuple[str, ...]) -> tuple[FloatArray, bool]:
     """Return the covariance of the points of these names in their order, and if it is scaled."""
-    content = read_bytes(path)
-    try:
-        with np.load(io.BytesIO(content), allow_pickle=False) as archive:
-            ids, covariance = archive['ids'].tolist(), np.array(archive['covariance'], float)
-            scaled = bool(archive['scaled'])
-    except (KeyError, EOFError, ValueError, zipfile.BadZipFile) as error:
-        raise ValueError(f'{path} is damaged, accepted is what ahf orient writes') from error
-    size = 3 * len(ids)
-    if sorted(map(str, ids)) != sorted(names) or covariance.shape != (size, size):
-        raise ValueError(
-            f'{path} is of {len(ids)} points and has the shape {covariance.shape}, accepted is '
-            f'the covariance of the {len(names)} points of {NETWORK_FILE}'
-        )
-    place = {str(name): index for index, name in enumerate(ids)}
+    size = 3 * len(names)
+    shapes = {'ids': ('U', (len(names),)), 'covariance': ('f', (size, size)), 'scaled': ('b', ())}
+    found = read_arrays(path, shapes)
+    place = {name: index for index, name in enumerate(found['ids'].tolist())}
+    if place.keys() != set(names):
+        raise ValueError(f'{path} is of other points, accepted are those of {NETWORK_FILE}')
+    covariance = found['covariance'].astype(float)
     rows = np.array([3 * place[name] + axis for name in names for axis in range(3)], int)
-    return covariance[np.ix_(rows, rows)], scaled
+    return covariance[np.ix_(rows, rows)], bool(found['scaled'])
 
 
 @dataclass(frozen=True)
@@ -307,11 +299,10 @@ class _Record:
 
     def number(self, name: str) -> float:
         value = self.value(name, object)
-        if isinstance(value, bool) or not isinstance(value, (int, float)):
-            raise ValueError(f'{self.where}: {name} is {shown(value)}, accepted is a number')
-        if not math.isfinite(value):
-            raise ValueError(f'{self.where}: {name} is {value}, accepted is a finite number')
-        return float(value)
+        return checked_number(value, f'{self.where}: {name}', -LARGEST, LARGEST)
+
+    def integer(self, name: str) -> int:
+        return checked_integer(self.value(name, object), f'{self.where}: {name}', 0, MAXIMUM_ID)
 
     def record(self, name: str) -> _Record:
         return _Record(self.value(name, dict), f'{self.where}: {name}')
@@ -326,9 +317,9 @@ class _Record:
         value = self.value(name, list)
         try:
             matrix = np.array(value, float)
-        except (TypeError, ValueError):
+        except (TypeError, ValueError, OverflowError):
             matrix = np.full(shape, math.nan)
-        if matrix.shape != shape or not np.isfinite(matrix).all():
+        if matrix.shape != shape or not (np.abs(matrix) <= LARGEST).all():
             raise ValueError(
                 f'{self.where}: {name} is {shown(value)}, accepted are finite numbers in the '
                 f'shape {shape}'

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from ahf_ros.interchange.tables import Row, one_of, read_by_image, read_table
+from ahf_ros.opening import reader
 from ahf_ros.orientation.camera import rotation_matrices
 from ahf_ros.orientation.network import FloatArray
 from ahf_ros.orientation.transform import Transform, rotation_vector
@@ -23,6 +24,7 @@ _UNIT = 1e-3  # deviation from 1 of the length of a rounded quaternion
 _LARGEST_VECTOR = 2 * np.pi
 
 
+@reader('a table of poses in CSV')
 def read_robot_poses(path: str | Path) -> dict[str, Transform]:
     """Return the pose of the hand in the frame of the base at each image.
 
@@ -63,6 +65,7 @@ def _by_vector(row: Row) -> FloatArray:
     return vector
 
 
+@reader('a table of stations in CSV')
 def read_stations(path: str | Path) -> dict[str, str]:
     """Return the station of each image: those of one station were taken at the same time."""
     return read_by_image(path, 'station')

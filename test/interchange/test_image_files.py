@@ -61,7 +61,7 @@ def test_files_that_are_no_images_are_named(tmp_path):
     (tmp_path / 'text.png').write_text('not an image')
     for name, words in [
         ('missing.png', 'cannot be read: No such file'),
-        ('.', 'cannot be read: Is a directory'),
+        ('.', 'cannot be read: it is a folder'),
         ('empty.png', 'is empty'),
         ('text.png', 'is not an image'),
     ]:
