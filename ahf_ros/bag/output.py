@@ -11,6 +11,7 @@ import json
 import re
 import shutil
 import sqlite3
+import sys
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import closing, suppress
@@ -20,12 +21,12 @@ from typing import Any
 
 from rosbags.interfaces import Connection, ConnectionExtRosbag2, MessageDefinitionFormat
 from rosbags.rosbag2 import StoragePlugin, Writer
-from ruamel.yaml import YAML
 
 from ahf_ros.bag.definitions import CODED_TARGETS, COMPRESSED_IMAGE, typestore
 from ahf_ros.bag.mcap_records import add_checksums
 from ahf_ros.bag.source import METADATA, Source, read_metadata
 from ahf_ros.filtering.identifier import Memory
+from ahf_ros.parsed_yaml import parsed_yaml
 from ahf_ros.writing import place, write_whole
 
 JOURNAL = 'unfinished.sqlite'
@@ -249,7 +250,8 @@ def _set_custom_data(path: Path, custom: dict[str, str]) -> None:
     They are written as JSON that is YAML, too. What rosbags writes does not always read back: its
     YAML breaks long lines within the backslashes of a text.
     """
-    content = YAML(typ='safe').load(path.read_text(encoding='utf-8'))
+    text = path.read_text(encoding='utf-8')
+    content = parsed_yaml(text, str(path), sys.maxsize, aliases=True)
     content['rosbag2_bagfile_information']['custom_data'] = custom
     text = json.dumps(content, indent=1, ensure_ascii=False)  # YAML joins no surrogates
     escaped = _UNPRINTABLE.sub(lambda found: f'\\u{ord(found[0]):04x}', text)

@@ -15,6 +15,7 @@ from ahf_ros.cli import say, tell
 from ahf_ros.cli.identify import image_paths
 from ahf_ros.cli.options import add_option, input_name, output_path
 from ahf_ros.detectors.contract import DetectorSettings
+from ahf_ros.opening import parsing
 from ahf_ros.settings.parameter import parameters
 from ahf_ros.writing import write_files, write_whole
 
@@ -96,21 +97,22 @@ def _learn_rings(options: argparse.Namespace) -> int:
     from ahf_ros.detectors.ring.learning import MINIMUM_TARGETS, Bands, find_bands, learn_families
     from ahf_ros.interchange.image_files import read_image
 
-    paths, problems = image_paths(options.sources)
-    for problem in problems:
+    paths, problems, left_out = image_paths(options.sources)
+    for problem in (*problems, *left_out):
         tell('learn-family', problem)
     settings = DetectorSettings(**{name: getattr(options, name) for name in _OF_DOTS})
     found: list[Bands] = []
     crops: dict[bytes, np.ndarray] = {}
     for path in paths:
         try:
-            image = read_image(path)
+            with parsing(path, 'a photograph of ring targets'):
+                image = read_image(path)
+                bands = find_bands([image], settings)
+                crops |= _crops(image, bands)
         except ValueError as error:
             problems.append(str(error))
             tell('learn-family', error)
             continue
-        bands = find_bands([image], settings)
-        crops |= _crops(image, bands)
         found.append(replace(bands, image=bands.image + len(found)))
     if not found:
         raise ValueError('no photograph was read, accepted is one at least')

@@ -26,6 +26,7 @@ _AFTER_DATA = re.compile(rb'\xff[\x01-\xcf\xd8-\xfe]')  # the next marker but fo
 _PLACES = ((273, 279), (324, 325))  # tags of TIFF: where strips or tiles are, and their sizes
 
 _SAID = re.compile(r'(Corrupt JPEG data|Premature end of JPEG|TIFF_Error).*')
+_LOG = re.compile(r'\[ *(ERROR|WARN):\d+@')  # of OpenCV, on files that it does not read
 _PADDED = re.compile(r'(\d+) extraneous bytes before marker 0xd9')
 _PADDING = 16  # bytes after the data of all pixels, as some webcams send them
 
@@ -92,10 +93,12 @@ def _standard_error() -> Iterator[list[str]]:
         os.lseek(held, _passed, os.SEEK_SET)  # writes are appended, wherever this is
         written = os.read(held, os.fstat(held).st_size)
         _passed += len(written)
+        logged = False
         for line in written.splitlines(keepends=True):
             text = line.decode(errors='replace')
             lines.append(text)
-            if not _SAID.search(text):
+            logged = bool(_LOG.match(text) or (logged and not text.strip()))
+            if not (logged or _SAID.search(text)):
                 with suppress(OSError):  # nobody reads it any more
                     os.write(original, line)
     finally:

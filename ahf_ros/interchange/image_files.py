@@ -8,6 +8,8 @@ does not say where in a file the orientation is.
 
 from __future__ import annotations
 
+import math
+import re
 import struct
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -17,8 +19,8 @@ import cv2
 import numpy as np
 
 from ahf_ros.deprecation import deprecated_arguments
-from ahf_ros.imaging.image import check_size
-from ahf_ros.imaging.tiff import first_directory, is_tiff
+from ahf_ros.imaging.image import check_size, without_gaps
+from ahf_ros.imaging.tiff import Field, directories, first_at, first_directory, is_tiff
 from ahf_ros.imaging.whole import decoded
 from ahf_ros.opening import Most, read_bytes, reader
 from ahf_ros.writing import write_whole
@@ -31,8 +33,23 @@ UPRIGHT = 1
 
 _LAST_ORIENTATION = 8
 _PNG = b'\x89PNG\r\n\x1a\n'
-_WIDTH, _HEIGHT, _ORIENTATION = 256, 257, 274  # tags of TIFF
+_SUBFILE, _WIDTH, _HEIGHT, _COLOURS, _ORIENTATION = 254, 256, 257, 262, 274  # tags of TIFF
+_REDUCED = 1 | 4  # bits of the first: a reduced image, a mask
+_RAW = 32803, 34892  # colours: as the filter of the sensor, and linear raw
+_OTHERS = tuple(
+    (kind, re.compile(begin, re.DOTALL))
+    for kind, begin in (
+        ('HEIC', rb'....ftyp(hei|hev|mif1|msf1)'),
+        ('AVIF', rb'....ftypavi'),
+        ('JPEG XL', rb'\xff\x0a|\0\0\0\x0cJXL '),
+        ('JPEG 2000', rb'\0\0\0\x0cjP  |\xff\x4f\xff\x51'),
+        ('a raw image', rb'....ftypcrx |FUJIFILMCCD-RAW|IIR[OS]|MMOR|IIU\0|FOVb'),
+    )
+)
+"""Formats of cameras that a decoder may not know, by the bytes that they begin with."""
 _FRAMES = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}  # JPEG markers with the size
+_ACCEPTED = f'accepted is one of {", ".join(SUFFIXES)}'
+_ADVICE = f'{_ACCEPTED}: convert it in full size to 16-bit TIFF or PNG, without lens corrections'
 _DAMAGES = struct.error, ValueError, OverflowError  # of headers
 
 
@@ -100,7 +117,7 @@ def read_noted_image(path: str | Path, *, upright: bool = False) -> NotedImage:
         image = noted.image
         done, of = 'is not applied', 'the pixels'
     note = f'{path}: orientation {noted.orientation} {done}; coordinates are those of {of}'
-    return replace(noted, image=image, note=note)
+    return replace(noted, image=image, note='; '.join(filter(None, (noted.note, note))))
 
 
 def as_oriented(image: np.ndarray, orientation: int) -> np.ndarray:
@@ -130,12 +147,14 @@ def _decoded(content: bytes, name: str) -> NotedImage:
     if not content:
         raise ValueError(f'{name} is empty, accepted is an image')
     header = read_header(content)
+    if header.raw:
+        raise ValueError(f'{name} is a raw image, {_ADVICE}')
     check_size(header.width, header.height, name)
     stored = np.frombuffer(content, np.uint8)
-    if header.orientation_at and header.orientation != UPRIGHT:
-        # OpenCV applies the orientation of a TIFF file whatever its flags say.
-        stored, (place, layout) = stored.copy(), header.orientation_at
-        struct.pack_into(layout, stored, place, UPRIGHT)
+    if header.changes:
+        stored = stored.copy()
+        for place, layout, value in header.changes:
+            struct.pack_into(layout, stored, place, value)
     flags = cv2.IMREAD_GRAYSCALE | cv2.IMREAD_ANYDEPTH | cv2.IMREAD_IGNORE_ORIENTATION
     try:
         image, damage = decoded(stored, flags)
@@ -143,8 +162,11 @@ def _decoded(content: bytes, name: str) -> NotedImage:
         raise ValueError(f'{name} cannot be decoded: {error.err}') from error
     if image is None:
         what = f'is damaged: {damage}' if damage else 'is not an image, or is damaged'
-        raise ValueError(f'{name} {what}; accepted is one of {", ".join(SUFFIXES)}')
-    return NotedImage(image, header.orientation, damage=damage)
+        if kind := next((kind for kind, begin in _OTHERS if begin.match(content)), ''):
+            raise ValueError(f'{name} is {kind}, {_ADVICE}')
+        raise ValueError(f'{name} {what}; {_ACCEPTED}')
+    note = f'{name} has {header.pages} pages, the first is read' if header.pages > 1 else ''
+    return NotedImage(without_gaps(image), header.orientation, note, damage)
 
 
 def write_image(path: str | Path, image: np.ndarray) -> None:
@@ -181,14 +203,18 @@ def write_image(path: str | Path, image: np.ndarray) -> None:
 class ImageHeader:
     """What an image file says of itself.
 
-    A width or height of 0 px is not known. `orientation` is as in Exif, 1 to 8. `orientation_at`
-    is its place in a TIFF file and its layout for `struct`.
+    A width or height of 0 px is not known. `orientation` is as in Exif, 1 to 8. A TIFF file has
+    `pages`, and may be `raw`, what a sensor saw before colours were made of it. With `changes`,
+    each a place, a layout for `struct` and a value, decoders take the image of full size as it is
+    stored.
     """
 
     width: int = 0
     height: int = 0
     orientation: int = UPRIGHT
-    orientation_at: tuple[int, str] | None = None
+    pages: int = 1
+    raw: bool = False
+    changes: tuple[tuple[int, str, int], ...] = ()
 
 
 def read_header(content: bytes) -> ImageHeader:
@@ -200,6 +226,8 @@ def read_header(content: bytes) -> ImageHeader:
             return _jpeg(content)
         if is_tiff(content):
             return _tiff(content)
+        if content[:4] == b'RIFF' and content[8:12] == b'WEBP':
+            return _webp(content)
         if content.startswith(b'BM'):
             width, height = struct.unpack_from('<ii', content, 18)
             return ImageHeader(abs(width), abs(height))
@@ -238,24 +266,59 @@ def _jpeg(content: bytes) -> ImageHeader:
     return ImageHeader(orientation=orientation)
 
 
+def _webp(content: bytes) -> ImageHeader:
+    """Return the header of an extended WebP file; others have no orientation."""
+    width = height = 0
+    orientation = UPRIGHT
+    place = 12
+    while place + 8 <= len(content):
+        kind, size = struct.unpack_from('<4sL', content, place)
+        place += 8
+        if kind == b'VP8X':
+            sides = content[place + 4 : place + 7], content[place + 7 : place + 10]
+            width, height = (int.from_bytes(it, 'little') + 1 for it in sides)
+        if kind == b'EXIF':
+            orientation = _exif(content[place : place + size].removeprefix(b'Exif\0\0'))
+        place += size + size % 2
+    return ImageHeader(width, height, orientation)
+
+
 def _exif(content: bytes) -> int:
     """Return the orientation in Exif data, which are a TIFF file without pixels."""
     with suppress(*_DAMAGES):
-        return _tiff(content).orientation
+        return _value(content, first_directory(content), _ORIENTATION, UPRIGHT)
     return UPRIGHT
 
 
 def _tiff(content: bytes) -> ImageHeader:
-    """Return what the fields with one integer in the first directory say."""
-    fields = {tag: it for tag, it in first_directory(content).items() if it.count == 1}
+    """Return the header of the largest image that is not marked as a reduced one."""
+    found = directories(content)
+    first, *_ = found
 
-    def value(tag: int, default: int) -> int:
-        return int(fields[tag].values(content)[0]) if tag in fields else default
+    def sides(place: int) -> list[int]:
+        return [_value(content, found[place], tag, 0) for tag in (_WIDTH, _HEIGHT)]
 
-    noted = fields.get(_ORIENTATION)
+    whole = [it for it in found if not _value(content, found[it], _SUBFILE, 0) & _REDUCED]
+    chosen = max(whole or found, key=lambda it: math.prod(sides(it)))
+    fields = found[chosen]
+    changes = []
+    if chosen != first:
+        changes.append((*first_at(content), chosen))
+    if _ORIENTATION in fields:  # OpenCV applies it in a TIFF file whatever its flags say
+        changes.append((fields[_ORIENTATION].place, fields[_ORIENTATION].layout, UPRIGHT))
+    of_file = _value(content, found[first], _ORIENTATION, UPRIGHT)
     return ImageHeader(
-        value(_WIDTH, 0),
-        value(_HEIGHT, 0),
-        value(_ORIENTATION, UPRIGHT),
-        (noted.place, noted.layout) if noted else None,
+        width=sides(chosen)[0],
+        height=sides(chosen)[1],
+        orientation=_value(content, fields, _ORIENTATION, of_file),
+        pages=sum(sides(it) == sides(chosen) for it in whole),
+        raw=_value(content, fields, _COLOURS, 0) in _RAW or content[8:10] == b'CR',
+        changes=tuple(changes),
     )
+
+
+def _value(content: bytes, fields: dict[int, Field], tag: int, default: int) -> int:
+    """Return what a field with one integer says."""
+    if tag not in fields or fields[tag].count != 1:
+        return default
+    return int(fields[tag].values(content)[0])

@@ -30,7 +30,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def names(*arguments: object) -> tuple[list[str], list[str]]:
-    paths, problems = image_paths([str(argument) for argument in arguments])
+    paths, problems, _ = image_paths([str(argument) for argument in arguments])
     return [Path(path).name for path in paths], problems
 
 
