@@ -30,7 +30,7 @@ from rosbags.interfaces import Connection, ConnectionExtRosbag1, ConnectionExtRo
 
 from ahf_ros.bag.definitions import COMPRESSED_IMAGE, IMAGE, TypeStores, as_ros2
 from ahf_ros.bag.mcap_records import CutFile, read_records, seconds
-from ahf_ros.opening import read_text
+from ahf_ros.opening import parsing, read_text
 from ahf_ros.parsed_yaml import parsed_yaml
 from ahf_ros.text import counted, printable, reason_of
 
@@ -67,7 +67,7 @@ class Metadata:
 
 def read_metadata(folder: Path) -> Metadata:
     """Return what the metadata of a bag say; a ValueError unless they are as ROS 2 writes them."""
-    try:
+    with parsing(METADATA, 'what ROS 2 writes'):
         text = read_text(folder / METADATA, _MOST_METADATA)
         content = parsed_yaml(text, METADATA, _MOST_VALUES, aliases=True)
         about = content['rosbag2_bagfile_information']
@@ -80,9 +80,6 @@ def read_metadata(folder: Path) -> Metadata:
             counts=counts,
             custom={str(name): str(value) for name, value in custom.items()},
         )
-    except Exception as error:
-        # Text of any content makes the parser raise anything.
-        raise ValueError(f'{METADATA}: {reason_of(error)}') from error
 
 
 _Topic = tuple[Connection, Callable[[bytes], bytes]]

@@ -36,7 +36,7 @@ from ahf_ros.codes.families import AUTO
 from ahf_ros.doubt import doubtful_remark
 from ahf_ros.inputs import check_output, register_input
 from ahf_ros.interchange.files import RESULTS_FILE
-from ahf_ros.opening import Most, is_url, read_text, urls_named
+from ahf_ros.opening import Most, file_errors, is_url, read_text, urls_named
 from ahf_ros.session_settings import IdentificationSettings, StackSettings
 from ahf_ros.settings.parameter import parameters
 from ahf_ros.target import UNDECODED
@@ -347,7 +347,8 @@ def image_paths(arguments: Sequence[str]) -> tuple[list[str], list[str], list[st
     left_out: list[str] = []
     for argument in arguments:
         try:
-            found = list(_named(argument, left_out))
+            with file_errors(argument, 'read'):
+                found = list(_named(argument, left_out))
         except ValueError as error:
             problems.append(str(error))
             continue
@@ -366,7 +367,7 @@ def _named(argument: str, left_out: list[str]) -> Iterator[str]:
     if is_url(argument):
         yield from urls_named(argument, SUFFIXES)
     elif path.is_dir():
-        files = sorted(str(it) for it in path.iterdir() if it.is_file())
+        files = sorted(str(it) for it in path.iterdir() if not it.is_dir())
         kinds = Counter(Path(it).suffix.lower() or 'without an ending' for it in files)
         if others := [f'{number} {it}' for it, number in kinds.items() if it not in SUFFIXES]:
             accepted = ', '.join(SUFFIXES)
