@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from ahf_ros.extras import need
-from ahf_ros.interchange.image_files import read_header
+from ahf_ros.imaging.headers import read_header
 from ahf_ros.opening import Most, read_bytes, reader
 
 FILM_DIAGONAL = math.hypot(36, 24)
