@@ -56,7 +56,6 @@ MAY_OPEN = {
 """Modules that may open something else than what a user names, and what."""
 
 
-
 @pytest.fixture(scope='module')
 def folder() -> Iterator[Path]:
     with TemporaryDirectory() as made:

@@ -63,5 +63,3 @@ def _is_formula(text: str) -> bool:
     except ValueError:
         return True
     return False
-
-
