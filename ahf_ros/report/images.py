@@ -15,9 +15,9 @@ import cv2
 import numpy as np
 
 from ahf_ros.filtering.homomorphic import FilterSettings, HomomorphicFilter
-from ahf_ros.inputs import register_input
 from ahf_ros.imaging.image import stretched_to_8_bit
 from ahf_ros.imaging.stack import ImageStack, unlike
+from ahf_ros.inputs import register_input
 from ahf_ros.interchange.image_files import read_image
 from ahf_ros.report.results import ImageResult
 
