@@ -120,7 +120,7 @@ def _tables() -> Iterator[Sample]:
         read_truth, 'a.csv', b'image,id,x,y,confirmed\na.png,1,2.5,3.5,1\nb.png,1,2,3,0\n'
     )
     yield Sample(read_observations, 'a.csv', OBSERVED.encode())
-    yield Sample(lambda it: image_paths([f'@{it}']), 'a.txt', b'a.png\nday*/*.jpg\n')
+    yield Sample(lambda it: image_paths([f'@{it}']), 'a.txt', b'a.png\nb c.jpg\n')
 
 
 def _results() -> Iterator[Sample]:
