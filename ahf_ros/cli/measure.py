@@ -144,35 +144,23 @@ def _measured(options: argparse.Namespace, points: MeasuredPoints) -> _Measured:
     """Return distances, deviations and the test of lengths, as far as they are asked for."""
     from ahf_ros.interchange.control_files import read_lengths
     from ahf_ros.interchange.tables import read_points
-    from ahf_ros.orientation.measurement import deviations, distances, length_errors
+    from ahf_ros.orientation import measurement
 
     far: list[Distance] = []
     if options.distance or not (options.nominal or options.lengths):
-        far = distances(points, options.distance or None)
+        far = measurement.distances(points, options.distance or None)
     off: list[Deviation] = []
     if options.nominal:
         nominal = read_points(options.nominal)
-        if remark := _of_unit(points, nominal):
+        if remark := measurement.unit_remark(points, nominal):
             tell('measure', f'{options.nominal}: {remark}')
-        off = deviations(_aligned(options, points, nominal), nominal)
+        off = measurement.deviations(_aligned(options, points, nominal), nominal)
     test = None
     if options.lengths:
-        test = length_errors(points, read_lengths(options.lengths), options.permissible)
+        test = measurement.length_errors(
+            points, read_lengths(options.lengths), options.permissible
+        )
     return far, off, test
-
-
-def _of_unit(points: MeasuredPoints, nominal: dict[str, FloatArray]) -> str:
-    """Return a remark on nominal coordinates in another unit than that of the network."""
-    import numpy as np
-
-    from ahf_ros.orientation.units import other_unit
-
-    both = {name: index for index, name in enumerate(points.names) if name in nominal}
-    if len(both) < 2:
-        return ''
-    sets = np.array([nominal[name] for name in both]), points.xyz[list(both.values())]
-    given, measured = (float(np.linalg.norm(np.ptp(it, axis=0))) for it in sets)
-    return other_unit(given, measured, points.unit)
 
 
 def _aligned(

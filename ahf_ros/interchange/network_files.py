@@ -13,7 +13,6 @@ from ahf_ros.interchange.camera_files import CameraFile
 from ahf_ros.interchange.exif import Exif
 from ahf_ros.interchange.observation_files import ImagePoint, ObservedPhotograph
 from ahf_ros.interchange.tables import read_by_image
-from ahf_ros.opening import reader
 from ahf_ros.orientation.network import (
     CameraView,
     ControlPoint,
@@ -191,7 +190,6 @@ class CameraKnowledge:
     equidistant: bool = False
 
 
-@reader('a table of cameras in CSV')
 def read_cameras(path: str | Path) -> dict[str, str]:
     """Return the name of the camera of each photograph, from a table with image and camera."""
     return read_by_image(path, 'camera')

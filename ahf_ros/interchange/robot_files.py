@@ -65,7 +65,6 @@ def _by_vector(row: Row) -> FloatArray:
     return vector
 
 
-@reader('a table of stations in CSV')
 def read_stations(path: str | Path) -> dict[str, str]:
     """Return the station of each image: those of one station were taken at the same time."""
     return read_by_image(path, 'station')
