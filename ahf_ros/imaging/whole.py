@@ -25,8 +25,8 @@ _ALONE = frozenset((0x01, *range(0xD0, 0xD9)))  # markers without a segment
 _AFTER_DATA = re.compile(rb'\xff[\x01-\xcf\xd8-\xfe]')  # the next marker but for restarts
 _PLACES = ((273, 279), (324, 325))  # tags of TIFF: where strips or tiles are, and their sizes
 
-_SAID = re.compile(r'(Corrupt JPEG data|Premature end of JPEG|TIFF_Error).*')
-_LOG = re.compile(r'\[ *(ERROR|WARN):\d+@')  # of OpenCV, on files that it does not read
+_SAID = re.compile(r'(Corrupt JPEG data|Premature end of JPEG|TIFF_Error|libpng error).*')
+_LOG = re.compile(r'\[ *(ERROR|WARN):\d+@|libpng warning')  # of decoders
 _PADDED = re.compile(r'(\d+) extraneous bytes before marker 0xd9')
 _PADDING = 16  # bytes after the data of all pixels, as some webcams send them
 
