@@ -1,4 +1,4 @@
-"""Files that are written whole, tables in them, and folders that are locked meanwhile."""
+"""Names of files, and tables in CSV in which a spreadsheet computes nothing."""
 
 from __future__ import annotations
 
