@@ -23,10 +23,10 @@ from contextlib import ExitStack, contextmanager, suppress
 from hashlib import sha256
 from importlib import import_module
 from pathlib import Path, PurePath
-from typing import Any, BinaryIO
+from typing import IO, Any, BinaryIO
 
-from ahf_ros.inputs import check_output, register_input
-from ahf_ros.opening import file_errors
+from ahf_ros.inputs import check_output
+from ahf_ros.opening import Most, file_errors, inside, opened
 from ahf_ros.text import shown
 
 _fcntl: Any
@@ -38,6 +38,7 @@ except ImportError:  # on Windows
 MANIFEST = 'files'
 """Field of the main file of a set: the other files by name, with size and SHA-256."""
 
+_PART = 2**20  # bytes that are read at once
 _MOVES = '.unfinished.json'  # the files of a set that are about to take their places
 _LOCK_FILE = '.lock'
 _TRY_LOCK = 0.1  # s between two attempts
@@ -127,17 +128,16 @@ def check_set(main: Path, record: Mapping[str, Any]) -> None:
     They are registered as inputs. A set of an earlier version has no manifest.
     """
     manifest = record.get(MANIFEST, {})
-    if not isinstance(manifest, dict) or not all(map(_is_inside, manifest)):
-        raise ValueError(f'{main}: {MANIFEST} is {shown(manifest)}, accepted are files beside it')
+    if not isinstance(manifest, dict):
+        raise ValueError(f'{main}: {MANIFEST} is {shown(manifest)}, accepted are names of files')
     for name, about in manifest.items():
-        file = main.parent / name
-        register_input(file)
-        if file.is_file():
-            with file_errors(file, 'read'):
-                found = _about(file.read_bytes())
-            if found != about:
+        path = inside(main.parent, name)
+        if path.is_file():
+            with opened(path, Most.ARRAYS) as file, file_errors(path, 'read'):
+                whole = _is_as_written(file, about)
+            if not whole:
                 raise ValueError(
-                    f'{file} is of another run than {main.name} or was changed, accepted is a '
+                    f'{path} is of another run than {main.name} or was changed, accepted is a '
                     'folder as it was written'
                 )
 
@@ -152,7 +152,8 @@ def complete(folder: str | Path) -> None:
         return
     with file_errors(folder, 'completed'):
         try:
-            moves = json.loads(listed.read_bytes())
+            with listed.open('rb') as file:
+                moves = json.loads(file.read(Most.YAML))
             process, names, removed = int(moves['process']), moves['parts'], moves['removed']
             if not all(map(_is_inside, names)) or not all(map(_is_beside, removed)):
                 raise ValueError(f'{shown(moves)} has names outside of the folder')
@@ -286,6 +287,16 @@ def _sync_folder(folder: Path) -> None:
             os.close(descriptor)
 
 
+def _is_as_written(file: IO[bytes], about: object) -> bool:
+    """Return whether a file is what a manifest has about it."""
+    if not isinstance(about, dict) or about.get('size') != os.fstat(file.fileno()).st_size:
+        return False
+    digest = sha256()
+    while part := file.read(_PART):
+        digest.update(part)
+    return about.get('sha256') == digest.hexdigest()
+
+
 def _about(content: bytes) -> dict[str, Any]:
     return {'size': len(content), 'sha256': sha256(content).hexdigest()}
 
@@ -298,8 +309,10 @@ def _former(folder: Path, main: str) -> Iterator[str]:
         return  # there is no such set, or somebody else's
     for name in filter(_is_beside, manifest):
         with suppress(OSError, ValueError):  # it is gone, or an input
-            if manifest[name] == _about((folder / name).read_bytes()):
-                check_output(folder / name)
+            check_output(folder / name)
+            with (folder / name).open('rb') as file:
+                unchanged = _is_as_written(file, manifest[name])
+            if unchanged:
                 yield name
 
 

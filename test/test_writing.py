@@ -157,6 +157,15 @@ def test_a_mixture_of_two_networks_is_refused(tmp_path: Path, name: str) -> None
         read_network(tmp_path / 'second')
 
 
+@pytest.mark.parametrize('files', [[], 5, {'../a': {}}, {'a/b': {}}, {'': {}}, {'points.csv': 5}])
+def test_a_damaged_manifest_is_named(tmp_path: Path, files: object) -> None:
+    networks()[0](tmp_path)
+    record = json.loads((tmp_path / 'network.json').read_text())
+    (tmp_path / 'network.json').write_text(json.dumps(record | {'files': files}))
+    with pytest.raises(ValueError, match='accepted'):
+        read_network(tmp_path)
+
+
 def test_files_of_the_former_set_go_and_those_of_others_stay(tmp_path: Path) -> None:
     first, second = networks()
     first(tmp_path)

@@ -230,18 +230,3 @@ def test_an_input_stays(
             assert left[name].samefile(file)
             left.pop(name).unlink()
     assert {it: it.read_bytes() for it in before} == before
-
-
-@pytest.mark.parametrize('command', [name for name, line in LINES.items() if line])
-def test_without_a_collision_all_is_written(
-    stage: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: str
-) -> None:
-    """The lines are those that do what they are for, and write what they are said to."""
-    if command == 'watch':
-        return
-    shutil.copytree(stage, tmp_path, dirs_exist_ok=True)
-    monkeypatch.chdir(tmp_path)
-    words, _ = line_of(command, 'stations')
-    status(*words)
-    of_command = [it for name, it in WRITTEN.items() if name.split()[0] == command]
-    assert [it for it in of_command if not Path(it).is_file()] == []
