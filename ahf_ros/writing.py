@@ -42,7 +42,7 @@ _PART = 2**20  # bytes that are read at once
 _MOVES = '.unfinished.json'  # the files of a set that are about to take their places
 _LOCK_FILE = '.lock'
 _TRY_LOCK = 0.1  # s between two attempts
-_LOCK_TIMEOUT = 10.0  # s; another set takes its place in far less
+_LOCK_TIMEOUT = 1.0  # s; another set takes its place in far less
 
 
 def write_whole(path: str | Path, content: bytes) -> None:
@@ -90,7 +90,7 @@ def write_files(
             return ()
         moves = {'process': os.getpid(), 'parts': names, 'removed': [*{*former} - {*names}]}
         with file_errors(folder, 'written'), ExitStack() as lock:
-            with suppress(OSError):  # there are file systems without locks
+            with suppress(OSError, ValueError):  # no locks here, or results that are being kept
                 lock.enter_context(locked(root, _LOCK_TIMEOUT))
             complete(root)
             try:

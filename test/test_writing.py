@@ -23,7 +23,7 @@ from ahf_ros.interchange.network_results import read_network, write_network
 from ahf_ros.interchange.registration_files import ScanRecord, write_registration
 from ahf_ros.orientation.transform import Transform
 from ahf_ros.registration.field import Field, added
-from ahf_ros.writing import complete, write_files, write_set, write_whole
+from ahf_ros.writing import complete, locked, write_files, write_set, write_whole
 from support import ROOT
 from support.disk import room_for
 from support.faults import with_fault
@@ -197,6 +197,12 @@ def test_a_damaged_list_of_moves_is_named(tmp_path: Path, content: str) -> None:
     (tmp_path / '.unfinished.json').write_text(content)
     with pytest.raises(ValueError, match=r'unfinished\.json is damaged'):
         complete(tmp_path)
+
+
+def test_results_that_are_being_kept_in_a_folder_are_no_obstacle(tmp_path: Path) -> None:
+    with locked(tmp_path):
+        write_files(tmp_path, [('a', b'first'), ('b', b'second')])
+    assert contents(tmp_path) == {'a': b'first', 'b': b'second'}
 
 
 def test_permissions_are_kept(tmp_path: Path) -> None:
