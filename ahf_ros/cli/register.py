@@ -21,6 +21,7 @@ from ahf_ros.cli.options import (
     settings_from,
 )
 from ahf_ros.cloud_settings import CloudSettings
+from ahf_ros.opening import parsing
 from ahf_ros.registration_settings import RegistrationSettings
 from ahf_ros.session_settings import IdentificationSettings
 
@@ -77,10 +78,11 @@ def run(options: argparse.Namespace) -> int:
         files: list[Path] = []
         for cloud_file, image_file in pairs:
             try:
-                points = _target_points(cloud_file, image_file, identifier, clouds)
-                scans.register(points, registration.minimum_confidence)
+                with parsing(cloud_file, 'an organised cloud and its image'):
+                    points = _target_points(cloud_file, image_file, identifier, clouds)
+                    scans.register(points, registration.minimum_confidence)
             except ValueError as error:
-                tell('register', f'{cloud_file}: {error}')
+                tell('register', error)
                 failed = True
                 continue
             files.append(cloud_file)

@@ -27,12 +27,7 @@ _NAMES = [it.name for it in fields(Target)]
 _ABSENT = {'id': None, 'x': None, 'y': None, 'code': 0, 'semi_major': 0.0, 'semi_minor': 0.0}
 """What the fields of a target without a default are where they are not given."""
 
-_REASONS = (
-    'unread',
-    'uncertain',
-    'contested',
-    'unsettled',
-)  # see `ahf_ros.target.UndecodedTarget`
+_REASONS = 'unread', 'uncertain', 'contested', 'unsettled'  # see `UndecodedTarget`
 _MAXIMUM_DOTS = 1000  # of one target
 
 
