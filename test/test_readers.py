@@ -40,7 +40,7 @@ MAY_OPEN = {
     **dict.fromkeys(('opening.py', 'writing.py'), 'ways in and out'),
     'imaging/whole.py': 'standard error',
     'interchange/arrays.py': 'members of an archive in memory',
-    'interchange/exif.py': 'an image in memory',
+    'interchange/exif.py': 'a file that is open already',
     'interchange/export/colmap.py': 'a database that was written before',
     'interchange/export/xml_files.py': 'a script of the package',
     **dict.fromkeys(('bag/source.py', 'bag/mcap_records.py', 'bag/output.py'), 'bags'),

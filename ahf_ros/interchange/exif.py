@@ -6,13 +6,12 @@ import math
 import warnings
 from contextlib import suppress
 from dataclasses import dataclass
-from io import BytesIO
 from pathlib import Path
 from typing import Any
 
 from ahf_ros.extras import need
 from ahf_ros.imaging.headers import read_header
-from ahf_ros.opening import Most, read_bytes, reader
+from ahf_ros.opening import Most, opened, reader
 
 FILM_DIAGONAL = math.hypot(36, 24)
 """Diagonal of a film frame, mm, which equivalent focal lengths refer to (CIPA DCG-001)."""
@@ -47,15 +46,16 @@ def read_exif(path: str | Path) -> tuple[Exif, tuple[int, int]]:
     need('orient', 'PIL')
     from PIL import Image, UnidentifiedImageError
 
-    content = read_bytes(path, Most.IMAGE)
-    header = read_header(content)
     try:
-        with warnings.catch_warnings():
+        with opened(path, Most.IMAGE) as file, warnings.catch_warnings():
             warnings.simplefilter('ignore')  # large images, damaged fields
-            with Image.open(BytesIO(content)) as image:
-                exif = image.getexif()
-                size = (header.width, header.height) if header.width else image.size
+            with Image.open(file) as image:
+                size, exif = image.size, image.getexif()
                 fields = {**exif, **exif.get_ifd(_MORE)}
+                if image.format == 'TIFF':  # the first image may be a preview
+                    file.seek(0)
+                    header = read_header(file.read())
+                    size = (header.width, header.height) if header.width else size
     except (UnidentifiedImageError, Image.DecompressionBombError):
         return Exif(), (0, 0)
     except OSError as error:

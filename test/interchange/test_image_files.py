@@ -13,6 +13,7 @@ import pytest
 from ahf_ros.cli import main
 from ahf_ros.cli.identify import image_paths
 from ahf_ros.imaging.headers import read_header
+from ahf_ros.interchange.exif import read_exif
 from ahf_ros.interchange.image_files import (
     decode_bytes,
     read_image,
@@ -235,6 +236,13 @@ def test_the_image_of_full_size_is_read_wherever_it_is(order, parts):
     assert (noted.orientation, noted.note, noted.damage) == (6, '', '')
     header = read_header(content)
     assert (header.width, header.height, header.pages) == (50, 40, 1)
+
+
+def test_the_size_of_a_photograph_is_that_of_its_full_image(tmp_path):
+    pytest.importorskip('PIL')
+    path = tmp_path / 'a.tif'
+    path.write_bytes(paged(page(25, 20, 1), page(50, 40)))
+    assert read_exif(path)[1] == (50, 40)
 
 
 def test_pages_and_raw_images_are_named():
