@@ -33,7 +33,7 @@ unexport AMENT_PREFIX_PATH CMAKE_PREFIX_PATH LD_LIBRARY_PATH PYTHONPATH
 unexport _ROS_WHEELS_BOOTSTRAP_COMPLETE
 
 .PHONY: demo nodes test lint site test-native test-live test-commands test-computing test-detectors \
-	test-oldest test-portable test-kilted test-colcon yardstick browser clean
+	coverage test-oldest test-portable test-kilted test-colcon yardstick browser clean
 .DELETE_ON_ERROR:
 
 demo: $(INSTALLED)
@@ -42,8 +42,7 @@ demo: $(INSTALLED)
 nodes: $(NODES)
 
 # The longest first, and none so long that it ends alone: two cores end at the same time.
-test: test-live test-oldest yardstick test-detectors test-commands test-computing site lint \
-	test-portable
+test: test-live test-oldest yardstick test-detectors coverage site lint test-portable
 
 lint: $(READY)
 	$(BIN)/ruff check .
@@ -65,13 +64,18 @@ test-live: $(READY)
 	$(BIN)/python -m pytest $(LIVE)
 
 test-commands: $(READY)
-	$(BIN)/python -m pytest $(COMMANDS)
+	$(BIN)/coverage run -m pytest $(COMMANDS)
 
 test-detectors: $(READY)
 	$(BIN)/python -m pytest $(DETECTORS)
 
 test-computing: $(READY) | $(if $(CI),browser)
-	$(BIN)/python -m pytest $(patsubst %,--ignore %,$(LIVE) $(COMMANDS) $(DETECTORS))
+	$(BIN)/coverage run -m pytest $(patsubst %,--ignore %,$(LIVE) $(COMMANDS) $(DETECTORS))
+
+# Lines and branches of what reads and writes files that these two run, in their own processes.
+coverage: test-commands test-computing
+	$(BIN)/coverage combine --quiet
+	$(BIN)/coverage report
 
 # Pictures that this package did not render, beside the checkout: no change reads less of them,
 # reports more that is wrong or false, or makes more calls than the record. With UPDATE=1 what is
@@ -118,7 +122,7 @@ test-colcon:
 	env --unset=ROS_DISTRO test/colcon.sh build/colcon
 
 clean:
-	rm -rf .venv* build
+	rm -rf .venv* build .coverage*
 
 # The modules are used where they are.
 $(INSTALLED): pyproject.toml setup.py package.xml

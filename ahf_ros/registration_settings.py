@@ -39,6 +39,7 @@ class RegistrationSettings:
         'File of known coordinates of targets: a folder of ahf orient, CSV or JSON; empty: the '
         'first scan gives the frame.',
         read_only=True,
+        files=True,
     )
     unit: str = unit_parameter()
     minimum_confidence: float = parameter(

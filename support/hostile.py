@@ -6,6 +6,7 @@ Tests draw from it with hypothesis: always the same few examples, or many other 
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 import numpy as np
@@ -50,6 +51,39 @@ def mutated(content: bytes, random: np.random.Generator) -> bytes:
             changed[place : place + size] = changed[other : other + size]
         changed = changed or bytearray(b'\0')
     return bytes(changed)
+
+
+_TOKENS = re.compile(rb'[\w.+-]+|\s+|[^\w\s]')
+_WORDS = (
+    *(b'', b'-1', b'0', b'1e400', b'-1e308', b'1e99', b'nan', b'.nan', b'.inf', b'Infinity'),
+    *(b'9' * 30, b'9' * 400, b'1,5', b'1.234,5', b'0x1f', b'null', b'true', b'~', b'[', b'{'),
+    *(b'"', b"'", b';', b',', b'\t', b'\n', b'#', b'&a ', b'*a', b'!!int x', b'<<', b'\0', b'%'),
+    *('\ufeff'.encode(), '\u2028'.encode(), b'\xe9', b'a' * 5000, b'[' * 60, b'{a: ' * 40, b'..'),
+)
+_ENCODINGS = 'utf-16', 'utf-16-le', 'utf-16-be', 'utf-8-sig', 'utf-32'
+
+
+def mutated_text(content: bytes, random: np.random.Generator) -> bytes:
+    """Return a text with one to three other, missing, further or exchanged words."""
+    words = _TOKENS.findall(content) or [b'']
+    for _ in range(random.integers(1, 4)):
+        place, other = (int(it) for it in random.integers(len(words), size=2))
+        kind = random.integers(6)
+        if kind < 2:
+            words[place] = _WORDS[random.integers(len(_WORDS))]
+        elif kind == 2:
+            words[place] = b''
+        elif kind == 3:
+            words[place] *= 2
+        elif kind == 4:
+            words[place], words[other] = words[other], words[place]
+        else:
+            words[place:place] = words[other : other + 9]
+    text = b''.join(words)
+    if random.integers(8) == 0:
+        encoding = _ENCODINGS[random.integers(len(_ENCODINGS))]
+        return text.decode('utf-8', 'replace').encode(encoding)
+    return text
 
 
 @st.composite

@@ -11,21 +11,25 @@ import json
 import re
 import shutil
 import sqlite3
+import sys
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import closing, suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
+from zlib import crc32
 
 from rosbags.interfaces import Connection, ConnectionExtRosbag2, MessageDefinitionFormat
 from rosbags.rosbag2 import StoragePlugin, Writer
-from ruamel.yaml import YAML
 
 from ahf_ros.bag.definitions import CODED_TARGETS, COMPRESSED_IMAGE, typestore
 from ahf_ros.bag.mcap_records import add_checksums
 from ahf_ros.bag.source import METADATA, Source, read_metadata
 from ahf_ros.filtering.identifier import Memory
+from ahf_ros.opening import check_regular, parsing
+from ahf_ros.parsed_yaml import parsed_yaml
+from ahf_ros.writing import place, write_whole
 
 JOURNAL = 'unfinished.sqlite'
 
@@ -36,7 +40,7 @@ Output = tuple[str, bytes]
 
 _TABLES = (
     'task (origin TEXT)',
-    'images (number INTEGER PRIMARY KEY, entry TEXT)',
+    'images (number INTEGER PRIMARY KEY, entry TEXT, outputs INTEGER, checksum INTEGER)',
     'outputs (image INTEGER, number INTEGER, topic TEXT, data BLOB, PRIMARY KEY (image, number))',
 )
 # Under which a bag keeps what it was made from, and what became of it.
@@ -95,8 +99,14 @@ class Journal:
         self._database = sqlite3.connect(folder / JOURNAL)
         # What the system holds outlives a killed process; the disk would take 8 ms an image.
         self._database.execute('PRAGMA synchronous=OFF')
-        rows = self._database.execute('SELECT entry FROM images ORDER BY number')
-        self.entries = [_entry(text) for (text,) in rows]
+        self.entries: list[Entry] = []
+        with parsing(folder / JOURNAL, 'what this version has begun'):
+            rows = self._database.execute('SELECT * FROM images ORDER BY number').fetchall()
+            for number, (image, text, count, checksum) in enumerate(rows):
+                outputs = self._outputs(number)
+                if (image, count, checksum) != (number, len(outputs), _checksum(text, outputs)):
+                    raise ValueError(f'image {number} is damaged, accepted is to remove the file')
+                self.entries.append(_entry(text))
 
     def close(self) -> None:
         """Close the file."""
@@ -104,11 +114,10 @@ class Journal:
 
     def append(self, entry: Entry, outputs: Sequence[Output]) -> None:
         """Write the entry of an image and the messages about it, all or nothing."""
-        image = len(self.entries)
+        image, text = len(self.entries), json.dumps(asdict(entry))
         with self._database:
-            self._database.execute(
-                'INSERT INTO images VALUES (?, ?)', (image, json.dumps(asdict(entry)))
-            )
+            row = image, text, len(outputs), _checksum(text, outputs)
+            self._database.execute('INSERT INTO images VALUES (?, ?, ?, ?)', row)
             self._database.executemany(
                 'INSERT INTO outputs VALUES (?, ?, ?, ?)',
                 ((image, number, *output) for number, output in enumerate(outputs)),
@@ -117,9 +126,17 @@ class Journal:
 
     def outputs(self) -> Iterator[tuple[Entry, list[Output]]]:
         """Yield every entry with the messages about its image, in order."""
+        return ((entry, self._outputs(image)) for image, entry in enumerate(self.entries))
+
+    def _outputs(self, image: int) -> list[Output]:
         query = 'SELECT topic, data FROM outputs WHERE image = ? ORDER BY number'
-        for image, entry in enumerate(self.entries):
-            yield entry, self._database.execute(query, (image,)).fetchall()
+        return self._database.execute(query, (image,)).fetchall()
+
+
+def _checksum(entry: str, outputs: Sequence[Output]) -> int:
+    """Return a checksum of the entry of an image and the messages about it."""
+    parts = [entry.encode(), *(it for topic, data in outputs for it in (topic.encode(), data))]
+    return crc32(b''.join(parts))
 
 
 def _entry(text: str) -> Entry:
@@ -142,8 +159,10 @@ def begin(output: Path, origin: str) -> None:
 
 def begun_with(output: Path) -> str:
     """Return the description that a bag was begun with, empty if it was not begun here."""
-    if (output / JOURNAL).is_file():
+    if (output / JOURNAL).exists():
+        check_regular(output / JOURNAL, sys.maxsize)
         with (
+            parsing(output / JOURNAL, 'what this version has begun'),
             closing(sqlite3.connect(output / JOURNAL)) as database,
             suppress(sqlite3.OperationalError),  # killed before it was begun
         ):
@@ -222,7 +241,7 @@ def write_bag(
     _set_custom_data(bag / METADATA, source.metadata.custom | own)
     for file in sorted(bag.iterdir(), key=lambda file: file.name == METADATA):
         # The metadata last: they say that the bag is finished.
-        file.replace(output / file.name)
+        place(file, output / file.name)
     return outcome
 
 
@@ -248,11 +267,12 @@ def _set_custom_data(path: Path, custom: dict[str, str]) -> None:
     They are written as JSON that is YAML, too. What rosbags writes does not always read back: its
     YAML breaks long lines within the backslashes of a text.
     """
-    content = YAML(typ='safe').load(path.read_text(encoding='utf-8'))
+    text = path.read_text(encoding='utf-8')
+    content = parsed_yaml(text, str(path), sys.maxsize, aliases=True)
     content['rosbag2_bagfile_information']['custom_data'] = custom
     text = json.dumps(content, indent=1, ensure_ascii=False)  # YAML joins no surrogates
     escaped = _UNPRINTABLE.sub(lambda found: f'\\u{ord(found[0]):04x}', text)
-    path.write_text(escaped, encoding='utf-8')
+    write_whole(path, escaped.encode())
 
 
 def _write(

@@ -41,12 +41,13 @@ from ahf_ros.bag.registration import RegistrationTask, check_registration
 from ahf_ros.bag.source import METADATA, Message, Source
 from ahf_ros.detectors import create_detector
 from ahf_ros.drawing.overlay import draw
-from ahf_ros.interchange.files import locked
 from ahf_ros.interchange.target_messages import coded_target_array
+from ahf_ros.opening import parsing
 from ahf_ros.session_settings import IdentificationSettings, StackSettings
 from ahf_ros.settings.nested import flat_values
 from ahf_ros.settling import settled_families
 from ahf_ros.stream import Answer, Frame, Kind, Remark, Stream, message_frame, refusal
+from ahf_ros.writing import locked
 
 WRITING_ERRORS = (OSError, sqlite3.Error, WriterError)
 """Errors of writing a bag, such as a full disk or a folder without permission."""
@@ -55,7 +56,7 @@ Report = Callable[[int, int, str], None]
 """Called after each image with the number of finished images, the number of all images or 0 if
 unknown, and what there is to say about this image or its stack, empty if there is nothing."""
 
-_FORMAT = 4  # version of the journal and of the data stored in a bag
+_FORMAT = 5  # version of the journal and of the data stored in a bag
 _TOPIC_NAME = re.compile(r'/?[A-Za-z_]\w*(/[A-Za-z_]\w*)*', re.ASCII)
 _ADDRESS = re.compile('[?#%]')  # rosbags opens SQLite files by an address
 
@@ -180,7 +181,8 @@ def _begin(output: Path, origin: dict[str, Any]) -> None:
             )
         begin(output, json.dumps(origin))
         return
-    before = json.loads(begun)
+    with parsing(output, 'what this version has begun'):
+        before = dict(json.loads(begun))
     for name in before | origin:
         if before.get(name) != origin.get(name):
             raise ValueError(

@@ -8,6 +8,7 @@ damage ends its file there.
 
 from __future__ import annotations
 
+import re
 import sqlite3
 from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Iterator
@@ -26,10 +27,11 @@ from mcap.records import Metadata as McapMetadata
 from mcap.writer import CompressionType, Writer
 from rosbags import rosbag1, rosbag2
 from rosbags.interfaces import Connection, ConnectionExtRosbag1, ConnectionExtRosbag2
-from ruamel.yaml import YAML
 
 from ahf_ros.bag.definitions import COMPRESSED_IMAGE, IMAGE, TypeStores, as_ros2
 from ahf_ros.bag.mcap_records import CutFile, read_records, seconds
+from ahf_ros.opening import parsing, read_text
+from ahf_ros.parsed_yaml import parsed_yaml
 from ahf_ros.text import counted, printable, reason_of
 
 Message = tuple[Connection, int, bytes]
@@ -49,6 +51,9 @@ _TABLES = ('schema', 'topics', 'message_definitions', 'messages')
 _OWN_METADATA = 'rosbag2'  # a copy of metadata.yaml in MCAP files
 _MAXIMUM_TOPICS = 2000  # time to write a bag grows with the square of their number
 _MAXIMUM_LINES = 100  # about what is missing; more are only counted
+_MOST_METADATA, _MOST_VALUES = 2**24, 500_000  # bytes and values of metadata.yaml
+_DEPTH = '/compressedDepth'
+_VIDEO = re.compile(r'.*/(FFMPEGPacket|CompressedVideo|Packet)')  # ffmpeg, Foxglove, theora
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,9 +67,10 @@ class Metadata:
 
 def read_metadata(folder: Path) -> Metadata:
     """Return what the metadata of a bag say; a ValueError unless they are as ROS 2 writes them."""
-    try:
-        text = (folder / METADATA).read_text(encoding='utf-8')
-        about = YAML(typ='safe').load(text)['rosbag2_bagfile_information']
+    with parsing(METADATA, 'what ROS 2 writes'):
+        text = read_text(folder / METADATA, _MOST_METADATA)
+        content = parsed_yaml(text, METADATA, _MOST_VALUES, aliases=True)
+        about = content['rosbag2_bagfile_information']
         counts: Counter[str] = Counter()
         for item in about['topics_with_message_count']:
             counts[str(item['topic_metadata']['name'])] += int(item['message_count'])
@@ -74,9 +80,6 @@ def read_metadata(folder: Path) -> Metadata:
             counts=counts,
             custom={str(name): str(value) for name, value in custom.items()},
         )
-    except Exception as error:
-        # Text of any content makes the parser raise anything.
-        raise ValueError(f'{METADATA}: {reason_of(error)}') from error
 
 
 _Topic = tuple[Connection, Callable[[bytes], bytes]]
@@ -153,10 +156,16 @@ class Source(ExitStack):
     def image_topics(self, names: Collection[str]) -> list[str]:
         """Return the given image topics, or all image topics if none are given.
 
-        A topic that is not in the bag or has no images is named by a ValueError.
+        A topic that is not in the bag or has no images is named by a ValueError. Topics of depth
+        images and of video are left out, and named.
         """
         kinds = {item.topic: item.msgtype for item in self.connections}
-        accepted = [topic for topic, kind in kinds.items() if kind in (IMAGE, COMPRESSED_IMAGE)]
+        unread = {topic: why for topic, kind in kinds.items() if (why := _unread(topic, kind))}
+        accepted = [
+            topic
+            for topic, kind in kinds.items()
+            if kind in (IMAGE, COMPRESSED_IMAGE) and topic not in unread
+        ]
         if not accepted:
             if self.lost:
                 lost = '; '.join(self.lost)
@@ -167,10 +176,15 @@ class Source(ExitStack):
             raise ValueError(
                 f'{self.path} has no images, accepted are topics of {IMAGE} or '
                 f'{COMPRESSED_IMAGE}{foreign}'
+                + ''.join(f'; {topic} {why}' for topic, why in unread.items())
             )
+        self.left_out |= {
+            f'answers to {topic}, which {why}': None for topic, why in unread.items()
+        }
         for name in names:
             if name not in accepted:
                 what = f'is of {kinds[name]}' if name in kinds else 'does not exist'
+                what = unread.get(name, what)
                 raise ValueError(
                     f'{self.path}: topic {name} {what}, accepted is one of {", ".join(accepted)}'
                 )
@@ -437,6 +451,15 @@ class Source(ExitStack):
 
 def _refused(topic: str, count: int, reason: str) -> str:
     return f'{topic}: {counted(count, "message")} cannot be converted: {reason}'
+
+
+def _unread(topic: str, kind: str) -> str:
+    """Return why the images of a topic are not read, nothing for others."""
+    if kind == COMPRESSED_IMAGE and topic.endswith(_DEPTH):
+        return 'has depth images'
+    if _VIDEO.fullmatch(kind):
+        return f'has video of {kind}: decode it, such as with image_transport republish'
+    return ''
 
 
 def _encoding(item: Connection) -> str:

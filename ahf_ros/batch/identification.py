@@ -20,9 +20,9 @@ from ahf_ros.doubt import doubt, repeated_remark
 from ahf_ros.drawing.overlay import draw, summary
 from ahf_ros.edge_shift import edge_shift_remark
 from ahf_ros.imaging.image import check_image, white_remark
-from ahf_ros.interchange.files import is_url, read_bytes, url_fingerprint
 from ahf_ros.interchange.image_files import read_noted_image, write_image
 from ahf_ros.interchange.target_json import to_json
+from ahf_ros.opening import Most, is_url, read_bytes, url_fingerprint
 from ahf_ros.session import create_identifier
 from ahf_ros.session_settings import IdentificationSettings
 from ahf_ros.settling import memory_of
@@ -113,7 +113,7 @@ def files_digest(files: str) -> str:
     """Return a text that differs where the content of files, separated by commas, does."""
     digest = hashlib.sha256()
     for path in files.split(',') if files else ():
-        digest.update(hashlib.sha256(read_bytes(path.strip())).digest())
+        digest.update(hashlib.sha256(read_bytes(path.strip(), Most.YAML)).digest())
     return digest.hexdigest()
 
 

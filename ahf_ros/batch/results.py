@@ -10,20 +10,24 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import sys
 import time
 from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
-from shutil import copyfile
+from shutil import copyfileobj
 from typing import Any
 
 from ahf_ros.batch.engine import Engine, Finished, TaskFailed, finished_tasks, in_order
 from ahf_ros.batch.identification import file_fingerprint, files_digest
 from ahf_ros.batch.task import ImageOutcome, ImageTask, Level, Message
-from ahf_ros.interchange.files import RESULTS_FILE, file_errors, locked
+from ahf_ros.inputs import check_output
+from ahf_ros.interchange.files import RESULTS_FILE
+from ahf_ros.opening import check_regular, file_errors
 from ahf_ros.release import release
 from ahf_ros.settings.nested import flat_values
+from ahf_ros.writing import locked, whole_file
 
 PREVIOUS = 'previous.jsonl'
 """Name of the file with the results that a run with other settings replaces."""
@@ -75,6 +79,9 @@ class Results:
             with _writing(folder):
                 folder.mkdir(parents=True, exist_ok=True)
                 opened.enter_context(locked(folder))
+                check_output(self.path)
+                if self.path.exists():
+                    check_regular(self.path, sys.maxsize)
                 self._file = self.path.open('a+b', buffering=0)
             opened.callback(lambda: self._file.close())
             self._read()
@@ -115,8 +122,8 @@ class Results:
             notes.append(f'{len(again)} results are out of date and made again: {names}{more}')
         if not all(map(self._is_of_today, again)):
             previous = self.path.with_name(PREVIOUS)
-            with _writing(previous):
-                copyfile(self.path, previous)
+            with _writing(previous), self.path.open('rb') as source, whole_file(previous) as copy:
+                copyfileobj(source, copy)
             notes.append(f'settings or version are others, earlier results are kept in {previous}')
         if again or self._damaged:
             self._rewrite([paths for paths in self._entries if paths not in pending])
@@ -225,19 +232,15 @@ class Results:
 
     def _rewrite(self, order: Iterable[tuple[str, ...]]) -> None:
         """Replace the file by one with the results of these tasks, atomically."""
-        part = self.path.with_name(f'.{RESULTS_FILE}.part')
         entries: dict[tuple[str, ...], _Entry] = {}
-        with _writing(self.path), part.open('wb') as file:
-            for paths in order:
-                entry = self._entries[paths]
-                entries[paths] = replace(entry, place=file.tell())
-                file.write(self._content(entry))
-            file.flush()
-            os.fsync(file.fileno())
-            file.close()
-            self._file.close()  # Windows replaces no open file
+        with _writing(self.path):
             try:
-                part.replace(self.path)
+                with whole_file(self.path) as file:
+                    for paths in order:
+                        entry = self._entries[paths]
+                        entries[paths] = replace(entry, place=file.tell())
+                        file.write(self._content(entry))
+                    self._file.close()  # Windows replaces no open file
             finally:
                 self._file = self.path.open('a+b', buffering=0)
         self._entries, self._damaged = entries, 0

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+from collections.abc import Sequence
 from contextlib import closing, redirect_stdout
 from dataclasses import replace
 from functools import partial
@@ -23,11 +24,14 @@ from ahf_ros.cli.options import (
     add_registration_options,
     add_search_options,
     add_target_options,
+    input_path,
+    output_path,
     settings_from,
 )
 from ahf_ros.cloud_settings import CloudSettings
 from ahf_ros.detectors import is_foreign
 from ahf_ros.extras import need
+from ahf_ros.inputs import inputs_kept, registered_inputs
 from ahf_ros.registration_settings import RegistrationSettings
 from ahf_ros.session_settings import IdentificationSettings, StackSettings
 from ahf_ros.settings.parameter import Parameter
@@ -48,13 +52,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         'bags',
         nargs='+',
-        type=Path,
+        type=input_path,
         metavar='IN',
         help='Bags: ROS 2 folders, .db3 or .mcap files, or ROS 1 .bag files.',
     )
     parser.add_argument(
         'output',
-        type=Path,
+        type=output_path,
         metavar='OUT',
         help='Output bag, a folder; for several bags, the folder for their output bags. An '
         'unfinished output bag is continued.',
@@ -85,7 +89,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     group = parser.add_argument_group('registration', text)
     group.add_argument(
         '--register',
-        type=Path,
+        type=output_path,
         metavar='DIR',
         help='Register all scans, and write clouds, transforms and targets to this folder, as '
         '~/save does; for several bags, the folder for their folders.',
@@ -111,7 +115,7 @@ def run(options: argparse.Namespace) -> int:
 
         engine = create_engine(
             'bag',
-            _attempt,
+            partial(_attempt, registered_inputs()),
             jobs,
             options.scheduler,
             _with_machine,
@@ -195,8 +199,13 @@ def _with_machine(result: _Result, machine: str) -> _Result:
     ]
 
 
-def _attempt(task: BagTask, report: Any) -> _Result:
-    """Return what became of the images of a bag, and of its scans."""
+def _attempt(inputs: Sequence[str], task: BagTask, report: Any) -> _Result:
+    """Return what became of the images of a bag, and of its scans; inputs stay as they are."""
+    with inputs_kept(inputs):
+        return _attempted(task, report)
+
+
+def _attempted(task: BagTask, report: Any) -> _Result:
     from ahf_ros.bag.registration import register_bag
     from ahf_ros.bag.run import WRITING_ERRORS, answer_bag
 

@@ -11,6 +11,7 @@ from types import ModuleType
 
 from ahf_ros.cli import say, tell
 from ahf_ros.extras import MissingExtra, missing
+from ahf_ros.inputs import inputs_kept
 from ahf_ros.release import release
 
 COMMANDS = {
@@ -58,13 +59,14 @@ def run(arguments: Sequence[str] | None) -> int:
     arguments = sys.argv[1:] if arguments is None else arguments
     if 'COMP_LINE' in os.environ:  # a shell wants to know how this line may go on
         return _complete(os.environ['COMP_LINE'])
-    options = _parser(arguments).parse_args(arguments)
-    try:
-        status: int = _module(options.subcommand).run(options)
-        return status
-    except (ValueError, MissingExtra) as error:
-        tell(options.subcommand, f'error: {error}')
-        return 2
+    with inputs_kept():
+        options = _parser(arguments).parse_args(arguments)
+        try:
+            status: int = _module(options.subcommand).run(options)
+            return status
+        except (ValueError, MissingExtra) as error:
+            tell(options.subcommand, f'error: {error}')
+            return 2
 
 
 def _complete(line: str) -> int:

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ahf_ros.cli import say, tell
-from ahf_ros.cli.options import add_option, add_quiet, parsed_by
+from ahf_ros.cli.options import add_option, add_quiet, input_path, output_path, parsed_by
 from ahf_ros.cli.tables import identifiers, print_table
 from ahf_ros.settings.parameter import Parameter
 from ahf_ros.text import decimals
@@ -23,8 +23,12 @@ _FORMATS = '.csv', '.svg'
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Give a parser the arguments of the command."""
-    parser.add_argument('first', metavar='EPOCH1', help='Folder that ahf orient wrote.')
-    parser.add_argument('second', metavar='EPOCH2', help='The same, of the later epoch.')
+    parser.add_argument(
+        'first', type=input_path, metavar='EPOCH1', help='Folder that ahf orient wrote.'
+    )
+    parser.add_argument(
+        'second', type=input_path, metavar='EPOCH2', help='The same, of the later epoch.'
+    )
     parser.add_argument(
         '-o',
         '--output',
@@ -59,9 +63,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Compare the epochs, show what moved, and write files."""
-    from ahf_ros.interchange.files import csv_table, write_whole
+    from ahf_ros.interchange.files import csv_table
     from ahf_ros.interchange.network_results import read_network
     from ahf_ros.orientation.congruence import compare
+    from ahf_ros.writing import write_whole
 
     try:
         epochs = [read_network(path).points for path in (options.first, options.second)]
@@ -91,7 +96,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _output(text: str) -> Path:
-    path = Path(text)
+    path = output_path(text)
     if path.suffix.lower() not in _FORMATS:
         raise ValueError(f'{text} has another ending, accepted are {" and ".join(_FORMATS)}')
     return path

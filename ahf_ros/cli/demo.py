@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ahf_ros.cli.options import add_option
+from ahf_ros.cli.options import add_option, output_path
 from ahf_ros.drawing.overlay import (
     DECODED_COLOUR,
     MISSED_COLOUR,
@@ -19,8 +19,8 @@ from ahf_ros.drawing.overlay import (
 from ahf_ros.drawing.tiles import Tile, side_by_side
 from ahf_ros.evaluation import FALSE, RIGHT, WRONG, judge, line, method
 from ahf_ros.filtering.homomorphic import filtered
-from ahf_ros.interchange.files import file_errors
 from ahf_ros.interchange.image_files import write_image
+from ahf_ros.opening import file_errors
 from ahf_ros.session import create_identifier
 from ahf_ros.settings.parameter import Parameter
 from ahf_ros.synthetic.patterns import LIGHT_NAMES
@@ -50,7 +50,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     text = 'Ambient light as a share of the projected light.'
     add_option(parser, Parameter('ambient', scene.ambient, text))
     add_option(parser, Parameter('seed', scene.seed, 'Seed of the image.'))
-    parser.add_argument('--output', default='demo', help='Folder for the picture. Default: demo.')
+    parser.add_argument(
+        '--output',
+        type=output_path,
+        default='demo',
+        metavar='DIR',
+        help='Folder for the picture. Default: demo.',
+    )
 
 
 def run(options: argparse.Namespace) -> int:
@@ -60,7 +66,7 @@ def run(options: argparse.Namespace) -> int:
     and the detector `ring`, which needs no filter. One line for each says what was right and
     wrong, and one picture shows it.
     """
-    picture = Path(options.output, 'image_1.jpg')
+    picture = options.output / 'image_1.jpg'
     scene = SceneSettings(**SCENE, light=options.light, ambient=options.ambient, seed=options.seed)
     with file_errors(picture.parent, 'made'):
         picture.parent.mkdir(parents=True, exist_ok=True)

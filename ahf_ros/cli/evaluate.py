@@ -8,7 +8,7 @@ import sys
 from typing import Any
 
 from ahf_ros.cli import tell
-from ahf_ros.cli.options import add_option
+from ahf_ros.cli.options import add_option, input_name
 from ahf_ros.evaluation import TOLERANCE, Score, evaluate, table, total
 from ahf_ros.interchange.target_json import read_results
 from ahf_ros.interchange.truth_files import read_truth
@@ -18,9 +18,17 @@ from ahf_ros.text import printable
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Give a parser the arguments of the command."""
-    parser.add_argument('truth', metavar='TRUTH.csv', help='Columns image, id, x, y[, confirmed].')
     parser.add_argument(
-        'results', metavar='RESULTS.jsonl', help='One JSON object per image; - is standard input.'
+        'truth',
+        type=input_name,
+        metavar='TRUTH.csv',
+        help='Columns image, id, x, y[, confirmed].',
+    )
+    parser.add_argument(
+        'results',
+        type=input_name,
+        metavar='RESULTS.jsonl',
+        help='One JSON object per image; - is standard input.',
     )
     parser.add_argument(
         '--json',

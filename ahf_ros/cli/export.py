@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from ahf_ros.cli import say, tell
-from ahf_ros.cli.options import Group, add_option, parsed_by
+from ahf_ros.cli.options import Group, add_option, input_name, parsed_by
 from ahf_ros.interchange.export.formats import FORMATS, Export
 from ahf_ros.settings.parameter import Parameter
 from ahf_ros.text import counted
@@ -24,7 +24,10 @@ _FOLDER = f'to a folder as other software reads them: {", ".join(FORMATS)}.'
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Give a parser the arguments of the command."""
     parser.add_argument(
-        'results', metavar='RESULTS.jsonl', help='One JSON object per image; - is standard input.'
+        'results',
+        type=input_name,
+        metavar='RESULTS.jsonl',
+        help='One JSON object per image; - is standard input.',
     )
     parser.add_argument(
         'export',
@@ -51,7 +54,10 @@ def add_export_arguments(parser: Group) -> None:
 
 def _add_control_arguments(parser: Group) -> None:
     parser.add_argument(
-        '--control', metavar='POINTS.csv', help='Control points to export: ID, x, y, z.'
+        '--control',
+        type=input_name,
+        metavar='POINTS.csv',
+        help='Control points to export: ID, x, y, z.',
     )
     text = (
         'Coordinate reference system of the control points, such as EPSG:25832; empty for local '
@@ -94,9 +100,9 @@ def control_from(options: argparse.Namespace) -> Control | None:
     if options.control is None:
         return None
     from ahf_ros.interchange.export.survey import Control
-    from ahf_ros.interchange.point_lists import read_point_list
+    from ahf_ros.interchange.tables import read_points
 
-    points = read_point_list(options.control)
+    points = read_points(options.control)
     return Control(points, options.control_crs.strip(), options.control_sigma)
 
 

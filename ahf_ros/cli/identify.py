@@ -28,15 +28,19 @@ from ahf_ros.cli.options import (
     add_output_options,
     add_search_options,
     add_target_options,
+    input_name,
+    output_path,
     settings_from,
 )
 from ahf_ros.codes.families import AUTO
 from ahf_ros.doubt import doubtful_remark
-from ahf_ros.interchange.files import RESULTS_FILE, is_url, read_text, urls_named
+from ahf_ros.inputs import check_output, register_input
+from ahf_ros.interchange.files import RESULTS_FILE
+from ahf_ros.opening import Most, file_errors, is_url, read_text, urls_named
 from ahf_ros.session_settings import IdentificationSettings, StackSettings
 from ahf_ros.settings.parameter import parameters
 from ahf_ros.target import UNDECODED
-from ahf_ros.text import shown
+from ahf_ros.text import listed, shown
 
 if TYPE_CHECKING:
     import numpy as np
@@ -51,6 +55,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         'images',
         nargs='+',
+        type=input_name,
         metavar='IMAGE',
         help='Image files; folders, for their images; patterns in quotation marks, such as '
         '"day*/*.jpg" or "**/*.tif"; URLs of storages that fsspec reads, such as s3:// and '
@@ -61,7 +66,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     output = parser.add_argument_group('output')
     output.add_argument(
         '--output',
-        type=Path,
+        type=output_path,
         metavar='DIR',
         help=f'Write results to {RESULTS_FILE} in this folder as they come. The same command '
         'again goes on where it was interrupted; files that have changed, and all with other '
@@ -98,10 +103,10 @@ def _run(options: argparse.Namespace, output: TextIO | None) -> int:
             'upright is given with export, accepted is one of them: other software counts pixels '
             'as they are stored'
         )
-    paths, problems = image_paths(options.images)
+    paths, problems, left_out = image_paths(options.images)
     beside = dict.fromkeys(Path(path).parent / 'families' for path in paths if not is_url(path))
     settings = settings_from(options, IdentificationSettings, beside)
-    for problem in problems:
+    for problem in (*problems, *([] if options.quiet else left_out)):
         tell('identify', problem)
     jobs, tasks = _tasks(options, settings, paths)
     for export in options.export:
@@ -285,6 +290,8 @@ def image_task(
 ) -> ImageTask:
     """Return the task of images that are identified together, with more fields of it."""
     paths = tuple(paths)
+    for path in paths:
+        register_input(path)
     return ImageTask(
         paths=paths,
         settings=settings,
@@ -299,7 +306,10 @@ def _overlay_paths(options: argparse.Namespace, images: Iterable[str]) -> tuple[
     """Return the files that images are drawn to; none if there is no folder for them."""
     if options.overlay is None:
         return ()
-    return tuple(str(options.overlay / f'{Path(it).stem}_overlay.png') for it in images)
+    paths = tuple(str(options.overlay / f'{Path(it).stem}_overlay.png') for it in images)
+    for path in paths:  # here, since another process knows its own images only
+        check_output(path)
+    return paths
 
 
 def _outcomes(
@@ -320,45 +330,55 @@ def _outcomes(
         yield from kept_outcomes_in_order(engine, tasks, results, noted)
 
 
-def image_paths(arguments: Sequence[str]) -> tuple[list[str], list[str]]:
+def image_paths(arguments: Sequence[str]) -> tuple[list[str], list[str], list[str]]:
     """Return the image files that arguments name, and what is wrong with other arguments.
 
-    A file of the name comes first, whatever characters are in it. Files are in the order of the
-    arguments, and sorted by name within a folder or a pattern.
+    The last are lines on what is left out in folders. A file of the name comes first, whatever
+    characters are in it. Files are in the order of the arguments, and sorted by name within a
+    folder or a pattern.
 
     Examples
     --------
     >>> image_paths(['left.png', 'right.png'])
-    (['left.png', 'right.png'], [])
+    (['left.png', 'right.png'], [], [])
     """
     paths: list[str] = []
     problems: list[str] = []
+    left_out: list[str] = []
     for argument in arguments:
         try:
-            found = list(_named(argument))
+            with file_errors(argument, 'read'):
+                found = list(_named(argument, left_out))
         except ValueError as error:
             problems.append(str(error))
             continue
         if not found:
             problems.append(f'{shown(argument)} names no image, accepted are files and folders')
         paths += found
-    return paths, problems
+        for path in found:
+            register_input(path)
+    return paths, problems, left_out
 
 
-def _named(argument: str) -> Iterator[str]:
+def _named(argument: str, left_out: list[str]) -> Iterator[str]:
     from ahf_ros.interchange.image_files import SUFFIXES
 
     path = Path(argument)
     if is_url(argument):
         yield from urls_named(argument, SUFFIXES)
     elif path.is_dir():
-        yield from sorted(str(file) for file in path.iterdir() if file.suffix.lower() in SUFFIXES)
+        files = sorted(str(it) for it in path.iterdir() if not it.is_dir())
+        kinds = Counter(Path(it).suffix.lower() or 'without an ending' for it in files)
+        if others := [f'{number} {it}' for it, number in kinds.items() if it not in SUFFIXES]:
+            accepted = ', '.join(SUFFIXES)
+            left_out.append(f'{path}: left out are {listed(others)}; accepted are {accepted}')
+        yield from (it for it in files if it.lower().endswith(SUFFIXES))
     elif path.exists():
         yield argument
     elif argument.startswith('@'):
-        for line in read_text(argument[1:]).splitlines():
+        for line in read_text(argument[1:], Most.TABLE).splitlines():
             if line.strip():
-                yield from _named(line.strip())
+                yield from _named(line.strip(), left_out)
     elif has_magic(argument):
         yield from sorted(glob(argument, recursive=True))  # noqa: PTH207  no absolute ones in Path
     else:

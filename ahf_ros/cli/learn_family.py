@@ -13,10 +13,11 @@ from typing import TYPE_CHECKING
 
 from ahf_ros.cli import say, tell
 from ahf_ros.cli.identify import image_paths
-from ahf_ros.cli.options import add_option
+from ahf_ros.cli.options import add_option, input_name, output_path
 from ahf_ros.detectors.contract import DetectorSettings
-from ahf_ros.interchange.files import write_whole
+from ahf_ros.opening import parsing
 from ahf_ros.settings.parameter import parameters
+from ahf_ros.writing import write_files, write_whole
 
 if TYPE_CHECKING:
     import numpy as np
@@ -35,6 +36,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         'sources',
         nargs='+',
+        type=input_name,
         metavar='SOURCE',
         help='Photographs, or folders of these, of ring targets that nobody described; or one '
         'point list with rows CODEn, NUGGETn_A and NUGGETn_7, as V-STARS writes them.',
@@ -42,6 +44,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         '-o',
         '--output',
+        type=output_path,
         required=True,
         metavar='FILE',
         help='Data file. For photographs, pictures of the words that were seen are beside it, in '
@@ -55,6 +58,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     points = parser.add_argument_group('point lists')
     points.add_argument(
         '--base',
+        type=input_name,
         default='',
         metavar='FILE',
         help='Data file with the design in rough, for positions and codes that the points do not '
@@ -74,6 +78,8 @@ def run(options: argparse.Namespace) -> int:
     radius = options.dot_radius
     if radius is not None and not 0 < radius < float('inf'):
         raise ValueError(f'dot_radius is {radius!r}, accepted is a length above 0')
+    if options.output.suffix.lower() == '.png':
+        raise ValueError(f'output is {str(options.output)!r}, accepted is another ending')
     lists = [source for source in options.sources if source.lower().endswith('.csv')]
     if lists and len(options.sources) > 1:
         raise ValueError(
@@ -91,21 +97,22 @@ def _learn_rings(options: argparse.Namespace) -> int:
     from ahf_ros.detectors.ring.learning import MINIMUM_TARGETS, Bands, find_bands, learn_families
     from ahf_ros.interchange.image_files import read_image
 
-    paths, problems = image_paths(options.sources)
-    for problem in problems:
+    paths, problems, left_out = image_paths(options.sources)
+    for problem in (*problems, *left_out):
         tell('learn-family', problem)
     settings = DetectorSettings(**{name: getattr(options, name) for name in _OF_DOTS})
     found: list[Bands] = []
     crops: dict[bytes, np.ndarray] = {}
     for path in paths:
         try:
-            image = read_image(path)
+            with parsing(path, 'a photograph of ring targets'):
+                image = read_image(path)
+                bands = find_bands([image], settings)
+                crops |= _crops(image, bands)
         except ValueError as error:
             problems.append(str(error))
             tell('learn-family', error)
             continue
-        bands = find_bands([image], settings)
-        crops |= _crops(image, bands)
         found.append(replace(bands, image=bands.image + len(found)))
     if not found:
         raise ValueError('no photograph was read, accepted is one at least')
@@ -116,7 +123,7 @@ def _learn_rings(options: argparse.Namespace) -> int:
             f'{len(bands.size)} dots with a concentric band of sectors in {len(found)} images; '
             f'{MINIMUM_TARGETS} of one family are needed, and 20 tell it well'
         )
-    output = Path(options.output)
+    output = options.output
     for number, learnt in enumerate(families, 1):
         file = output if number == 1 else output.with_stem(f'{output.stem}_{number}')
         name = options.name or output.stem
@@ -131,8 +138,9 @@ def _write_rings(
 
     From the number of images and the pictures of targets, by their frames.
     """
+    import cv2
+
     from ahf_ros.codes.ring import ring_family
-    from ahf_ros.interchange.image_files import write_image
 
     inner, outer = (round(radius, 2) for radius in learnt.band)
     count = len(learnt.words)
@@ -152,9 +160,10 @@ def _write_rings(
         f'{f"pinhole: {pinhole:g}{chr(10)}" if pinhole else ""}'
         f'words: {rules}\nnumbers: {{first_bit: lowest}}\n'
     )
-    write_whole(str(file), text.encode())
+    sheet = file.with_suffix('.png')
+    _, picture = cv2.imencode(sheet.suffix, _contact_sheet(learnt, crops))
+    write_files(file.parent, {file.name: text.encode(), sheet.name: picture.tobytes()}.items())
     ring_family(str(file))
-    write_image(file.with_suffix('.png'), _contact_sheet(learnt, crops))
     say(
         f'{file}: {seen}, {learnt.bits} bits (log odds against the next number: '
         f'{learnt.lead:.0f}), band {inner:g} to {outer:g}, {learnt.polarity}, '
@@ -202,12 +211,12 @@ def _contact_sheet(learnt: LearntFamily, crops: dict[bytes, np.ndarray]) -> np.n
 def _learn_points(options: argparse.Namespace, points: str) -> int:
     from ahf_ros.codes.gsi import point_family
     from ahf_ros.codes.gsi_learning import learn_family, library_text, with_codes
-    from ahf_ros.interchange.point_lists import read_point_list
+    from ahf_ros.interchange.tables import read_points
 
     radius = options.dot_radius
     base = point_family(options.base)
-    name = options.name or Path(options.output).stem
-    learnt = learn_family(read_point_list(points), base, name)
+    name = options.name or options.output.stem
+    learnt = learn_family(read_points(points), base, name)
     family = replace(learnt.family, unit=options.unit, source=Path(points).name)
     if radius is not None:
         family = replace(
@@ -218,7 +227,7 @@ def _learn_points(options: argparse.Namespace, points: str) -> int:
         )
     family = with_codes(family, learnt.codes)
     write_whole(options.output, library_text(family).encode())
-    point_family(options.output)
+    point_family(str(options.output))
     _report(learnt, base, options)
     return 0
 

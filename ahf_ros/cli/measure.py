@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ahf_ros.cli import say, tell
-from ahf_ros.cli.options import add_quiet, parsed_by
+from ahf_ros.cli.options import add_quiet, input_name, input_path, output_path, parsed_by
 from ahf_ros.cli.tables import identifiers, print_table
 from ahf_ros.text import decimals
 
@@ -36,7 +36,9 @@ _Measured = tuple[list['Distance'], list['Deviation'], 'LengthTest | None']
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Give a parser the arguments of the command."""
-    parser.add_argument('network', metavar='NETWORK', help='Folder that ahf orient wrote.')
+    parser.add_argument(
+        'network', type=input_path, metavar='NETWORK', help='Folder that ahf orient wrote.'
+    )
     parser.add_argument(
         '--distance',
         action='append',
@@ -49,6 +51,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     nominal = parser.add_argument_group('nominal coordinates')
     nominal.add_argument(
         '--nominal',
+        type=input_name,
         metavar='POINTS.csv',
         help='Compare the coordinates with nominal ones: ID, x, y, z.',
     )
@@ -75,6 +78,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     lengths = parser.add_argument_group('calibrated lengths')
     lengths.add_argument(
         '--lengths',
+        type=input_name,
         metavar='LENGTHS.csv',
         help='Test calibrated lengths as VDI/VDE 2634-1 does: id_1, id_2, length, and perhaps '
         'sigma and line.',
@@ -88,7 +92,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         '-o',
         '--output',
-        type=Path,
+        type=output_path,
         metavar='DIR',
         help='Also write tables: distances.csv, deviations.csv, lengths.csv.',
     )
@@ -139,19 +143,23 @@ def _check(options: argparse.Namespace) -> None:
 def _measured(options: argparse.Namespace, points: MeasuredPoints) -> _Measured:
     """Return distances, deviations and the test of lengths, as far as they are asked for."""
     from ahf_ros.interchange.control_files import read_lengths
-    from ahf_ros.interchange.point_lists import read_point_list
-    from ahf_ros.orientation.measurement import deviations, distances, length_errors
+    from ahf_ros.interchange.tables import read_points
+    from ahf_ros.orientation import measurement
 
     far: list[Distance] = []
     if options.distance or not (options.nominal or options.lengths):
-        far = distances(points, options.distance or None)
+        far = measurement.distances(points, options.distance or None)
     off: list[Deviation] = []
     if options.nominal:
-        nominal = read_point_list(options.nominal)
-        off = deviations(_aligned(options, points, nominal), nominal)
+        nominal = read_points(options.nominal)
+        if remark := measurement.unit_remark(points, nominal):
+            tell('measure', f'{options.nominal}: {remark}')
+        off = measurement.deviations(_aligned(options, points, nominal), nominal)
     test = None
     if options.lengths:
-        test = length_errors(points, read_lengths(options.lengths), options.permissible)
+        test = measurement.length_errors(
+            points, read_lengths(options.lengths), options.permissible
+        )
     return far, off, test
 
 
@@ -250,11 +258,14 @@ def _show(points: MeasuredPoints, *found: Any) -> None:
 
 
 def _write(folder: Path, *found: Any) -> None:
-    from ahf_ros.interchange.files import csv_table, write_whole
+    from ahf_ros.interchange.files import csv_table
+    from ahf_ros.writing import write_files
 
-    for name, rows, _ in _tables(*found):
-        cells = [[_cell(value, '.9g') for value in row] for row in rows]
-        write_whole(folder / f'{name}.csv', csv_table(cells))
+    tables = {
+        f'{name}.csv': csv_table([_cell(value, '.9g') for value in row] for row in rows)
+        for name, rows, _ in _tables(*found)
+    }
+    write_files(folder, tables.items())
 
 
 def _record(

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ahf_ros.cli.options import add_option, parsed_by
+from ahf_ros.cli.options import add_option, input_name, parsed_by
 from ahf_ros.settings.parameter import Parameter
 
 if TYPE_CHECKING:
@@ -22,6 +21,7 @@ def add_mounting_arguments(group: argparse._ArgumentGroup) -> None:
     """Give a parser what is known of a robot or a rig."""
     group.add_argument(
         '--robot-poses',
+        type=input_name,
         metavar='POSES.csv',
         help='Poses of the hand in the frame of the base: image, x, y, z, and qx, qy, qz, qw or a '
         'rotation vector rx, ry, rz in rad. Writes where the cameras are on the hand.',
@@ -50,6 +50,7 @@ def add_mounting_arguments(group: argparse._ArgumentGroup) -> None:
     )
     group.add_argument(
         '--stations',
+        type=input_name,
         metavar='STATIONS.csv',
         help='Photographs that cameras fixed to each other took at once: image, station. Writes '
         'where the cameras are on one of them.',
@@ -75,19 +76,11 @@ def check_mounting(options: argparse.Namespace) -> None:
                 raise ValueError(f'{name} is given without robot_poses, which it describes')
 
 
-def write_mountings(solution: Solution, folder: Path, options: argparse.Namespace) -> None:
-    """Write where cameras are on a robot or a rig, if that is asked for, and print it."""
-    from ahf_ros.interchange.robot_files import write_mounting
-
+def mounting_record(solution: Solution, options: argparse.Namespace) -> dict[str, Any]:
+    """Return where cameras are on a robot or a rig, nothing if that is not asked for."""
     if options.robot_poses:
-        record = _on_robot(solution, options)
-    elif options.stations:
-        record = _on_rig(solution, options)
-    else:
-        return
-    write_mounting(folder, record)
-    if not options.quiet:
-        _print(record)
+        return _on_robot(solution, options)
+    return _on_rig(solution, options) if options.stations else {}
 
 
 def _on_robot(solution: Solution, options: argparse.Namespace) -> dict[str, Any]:
@@ -156,7 +149,8 @@ def _record(
     }
 
 
-def _print(record: dict[str, Any]) -> None:
+def print_mounting(record: dict[str, Any]) -> None:
+    """Print where cameras are on standard error."""
     import numpy as np
     from rich.markup import escape
 

@@ -13,6 +13,7 @@ from ahf_ros.cloud_settings import CloudSettings
 from ahf_ros.codes.families import files_by_name
 from ahf_ros.detectors.contract import DetectorSettings
 from ahf_ros.filtering.settings import AdaptiveSettings
+from ahf_ros.inputs import register_input
 from ahf_ros.registration_settings import RegistrationSettings
 from ahf_ros.session_settings import IdentificationSettings
 from ahf_ros.settings.nested import assemble, flat_parameters
@@ -78,7 +79,7 @@ def add_output_options(parser: Group) -> None:
     )
     parser.add_argument(
         '--overlay',
-        type=Path,
+        type=output_path,
         metavar='DIR',
         help='Write each image with its targets marked to this folder, as NAME_overlay.png.',
     )
@@ -124,7 +125,8 @@ def add_option(parser: Group, item: Parameter, **changes: Any) -> None:
     if isinstance(item.default, bool):
         arguments |= {'action': argparse.BooleanOptionalAction}
     else:
-        arguments |= {'type': parsed_by(item.value_of), 'metavar': _METAVARS[type(item.default)]}
+        kind = input_files if item.files else parsed_by(item.value_of)
+        arguments |= {'type': kind, 'metavar': _METAVARS[type(item.default)]}
     name = f'--{item.name.replace("_", "-")}'
     parser.add_argument(name, dest=item.name, **(arguments | changes))
     if former := _FORMER.get(item.name):
@@ -152,6 +154,29 @@ class _Former(argparse.Action):
         setattr(namespace, self.dest, values)
 
 
+def input_name(text: str) -> str:
+    """Return what names a file to read, which no output replaces: the type of all such options."""
+    register_input(text)
+    return text
+
+
+def input_path(text: str) -> Path:
+    """Return the path of a file or folder to read, as `input_name` does."""
+    return Path(input_name(text))
+
+
+def input_files(text: str) -> str:
+    """Return what names files to read, separated by commas, as `input_name` does."""
+    for name in text.split(','):
+        register_input(name.strip())
+    return input_name(text)
+
+
+def output_path(text: str) -> Path:
+    """Return the path of a file or folder to write: the type of all such options."""
+    return Path(text)
+
+
 def parsed_by(function: Callable[[str], Value]) -> Callable[[str], Value]:
     """Return a function for the `type` of an argument; the user reads its ValueErrors."""
 
@@ -176,5 +201,7 @@ def settings_from(
     if 'family_file' in values:
         usual = Path(os.environ.get('XDG_CONFIG_HOME') or Path.home() / '.config')
         places = [*folders, usual / 'ahf_ros' / 'families']
-        values['family_file'] = files_by_name(values['family'], values['family_file'], places)
+        values['family_file'] = input_files(
+            files_by_name(values['family'], values['family_file'], places)
+        )
     return assemble(settings, values)

@@ -13,11 +13,23 @@ from contextlib import contextmanager, suppress
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from ahf_ros.cli import tell
-from ahf_ros.cli.mounting import add_mounting_arguments, check_mounting, write_mountings
-from ahf_ros.cli.options import add_option, add_quiet, parsed_by
+from ahf_ros.cli.mounting import (
+    add_mounting_arguments,
+    check_mounting,
+    mounting_record,
+    print_mounting,
+)
+from ahf_ros.cli.options import (
+    add_option,
+    add_quiet,
+    input_name,
+    input_path,
+    output_path,
+    parsed_by,
+)
 from ahf_ros.extras import need
 from ahf_ros.interchange.export.formats import NETWORK_FORMATS, parsed_export
 from ahf_ros.settings.parameter import Parameter
@@ -45,12 +57,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Give a parser the arguments of the command."""
     parser.add_argument(
         'observations',
+        type=input_name,
         metavar='RESULTS.jsonl',
         help='Output of ahf identify --json, - is standard input; or a table of another program '
         'that ends with .csv: image, id, x, y, and perhaps sigma, width and height.',
     )
     parser.add_argument(
-        '-o', '--output', type=Path, required=True, metavar='DIR', help='Folder to write.'
+        '-o', '--output', type=output_path, required=True, metavar='DIR', help='Folder to write.'
     )
     _add_camera_arguments(parser.add_argument_group('cameras'))
     _add_object_arguments(parser.add_argument_group('object'))
@@ -77,6 +90,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def _add_camera_arguments(group: argparse._ArgumentGroup) -> None:
     group.add_argument(
         '--calibration',
+        type=input_name,
         action='append',
         default=[],
         metavar='CAMERA.yaml',
@@ -103,13 +117,14 @@ def _add_camera_arguments(group: argparse._ArgumentGroup) -> None:
     )
     group.add_argument(
         '--cameras',
+        type=input_name,
         metavar='CAMERAS.csv',
         help='Which camera took which photograph: image, camera. Without it, photographs of one '
         'size, and one camera and focal length in their Exif data, are of one camera.',
     )
     group.add_argument(
         '--images',
-        type=Path,
+        type=input_path,
         action='append',
         default=[],
         metavar='DIR',
@@ -120,11 +135,13 @@ def _add_camera_arguments(group: argparse._ArgumentGroup) -> None:
 def _add_object_arguments(group: argparse._ArgumentGroup) -> None:
     group.add_argument(
         '--scale-bars',
+        type=input_name,
         metavar='BARS.csv',
         help='Known distances: id_1, id_2, length, sigma, and perhaps role, control or check.',
     )
     group.add_argument(
         '--control',
+        type=input_name,
         metavar='POINTS.csv',
         help='Known coordinates: id, x, y, z, and perhaps sigma_x, sigma_y, sigma_z or '
         'covariance_xx to covariance_zz, and role, control or check.',
@@ -320,7 +337,8 @@ def _write(solution: Solution, number: int, options: argparse.Namespace) -> bool
     """Write a network and its exports, print what was found, and return whether all is written."""
     from ahf_ros.interchange.export.formats import network_remark, write_network_export
     from ahf_ros.interchange.network_results import write_network
-    from ahf_ros.report.network_page import write_network_page
+    from ahf_ros.interchange.robot_files import mounting_files
+    from ahf_ros.report.network_page import network_page
 
     def folder_in(place: Path) -> Path:
         return place / f'group_{number + 1}' if number else place
@@ -330,11 +348,21 @@ def _write(solution: Solution, number: int, options: argparse.Namespace) -> bool
         if not options.quiet and (remark := network_remark(name, solution)):
             tell('orient', remark)
 
+    def page() -> None:
+        beside[REPORT_FILE] = network_page(solution, Path(options.observations).name)
+
+    def mount() -> None:
+        if record := mounting_record(solution, options):
+            mounted.append(record)
+            beside.update(mounting_files(record))
+
     folder = folder_in(options.output)
-    title = Path(options.observations).name
+    beside: dict[str, bytes] = {}
+    mounted: list[dict[str, Any]] = []
     steps: list[Callable[[], object]] = [
-        partial(write_network, folder, solution),
-        partial(write_network_page, folder / REPORT_FILE, solution, title),
+        page,
+        mount,
+        partial(write_network, folder, solution, beside),
         *(partial(export, name, place) for name, place in options.export),
     ]
     written = True
@@ -346,11 +374,8 @@ def _write(solution: Solution, number: int, options: argparse.Namespace) -> bool
             written = False
     if not options.quiet:
         print_network(solution, str(folder))
-    try:
-        write_mountings(solution, folder, options)
-    except ValueError as error:
-        tell('orient', error)
-        written = False
+        for record in mounted:
+            print_mounting(record)
     return written
 
 

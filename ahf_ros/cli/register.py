@@ -16,9 +16,12 @@ from ahf_ros.cli.options import (
     add_registration_options,
     add_search_options,
     add_target_options,
+    input_path,
+    output_path,
     settings_from,
 )
 from ahf_ros.cloud_settings import CloudSettings
+from ahf_ros.opening import parsing
 from ahf_ros.registration_settings import RegistrationSettings
 from ahf_ros.session_settings import IdentificationSettings
 
@@ -34,7 +37,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Give a parser the arguments of the command."""
     parser.add_argument(
         'folder',
-        type=Path,
+        type=input_path,
         metavar='FOLDER',
         help='Folder of organised clouds, PLY or PCD in metres, one point per pixel of an image '
         'of the same name.',
@@ -42,7 +45,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         '-o',
         '--output',
-        type=Path,
+        type=output_path,
         required=True,
         metavar='DIR',
         help='Write clouds in the frame, transforms and targets to this folder, as the service '
@@ -75,10 +78,11 @@ def run(options: argparse.Namespace) -> int:
         files: list[Path] = []
         for cloud_file, image_file in pairs:
             try:
-                points = _target_points(cloud_file, image_file, identifier, clouds)
-                scans.register(points, registration.minimum_confidence)
+                with parsing(cloud_file, 'an organised cloud and its image'):
+                    points = _target_points(cloud_file, image_file, identifier, clouds)
+                    scans.register(points, registration.minimum_confidence)
             except ValueError as error:
-                tell('register', f'{cloud_file}: {error}')
+                tell('register', error)
                 failed = True
                 continue
             files.append(cloud_file)

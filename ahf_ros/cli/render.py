@@ -5,12 +5,12 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
 from typing import NamedTuple
 
 from ahf_ros import ending
 from ahf_ros.cli import say, tell
-from ahf_ros.cli.options import add_option, settings_from
+from ahf_ros.cli.options import add_option, output_path, settings_from
+from ahf_ros.inputs import release_input
 from ahf_ros.interchange.image_files import write_image
 from ahf_ros.interchange.truth_files import read_truth, write_truth
 from ahf_ros.settings.nested import flat_parameters
@@ -51,7 +51,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     """Give a parser the arguments of the command."""
     parser.add_argument(
         'folder',
-        type=Path,
+        type=output_path,
         metavar='DIR',
         help='Folder for LIGHT_AMBIENT_SEED.png, or LIGHT_AMBIENT_SEED_PHASE.png with several '
         'phases, and truth.csv; created if it does not exist.',
@@ -89,6 +89,7 @@ def run(options: Namespace) -> int:
     truth_path = options.folder / 'truth.csv'
     try:
         truth = dict(read_truth(truth_path)) if truth_path.exists() else {}
+        release_input(truth_path)  # which goes on
         for picture in pictures:
             ending.check()
             rendering = picture.made()

@@ -8,7 +8,14 @@ from pathlib import Path
 
 from ahf_ros.cli import say, tell
 from ahf_ros.cli.engines import progress_bar
-from ahf_ros.cli.options import add_options, add_quiet, settings_from
+from ahf_ros.cli.options import (
+    add_options,
+    add_quiet,
+    input_name,
+    input_path,
+    output_path,
+    settings_from,
+)
 from ahf_ros.interchange.truth_files import read_truth
 from ahf_ros.report.page import ReportSettings, write_page
 from ahf_ros.report.results import read_results
@@ -20,15 +27,21 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         'results',
         nargs='+',
+        type=input_name,
         metavar='RESULTS',
         help='Files of JSON lines as ahf identify --json prints them, and folders of such files.',
     )
     parser.add_argument(
-        '-o', '--output', type=Path, required=True, metavar='FILE.html', help='Page to write.'
+        '-o',
+        '--output',
+        type=output_path,
+        required=True,
+        metavar='FILE.html',
+        help='Page to write.',
     )
     parser.add_argument(
         '--images',
-        type=Path,
+        type=input_path,
         action='append',
         default=[],
         metavar='DIR',
@@ -36,6 +49,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         '--truth',
+        type=input_name,
         metavar='TRUTH.csv',
         help='What the images show, with the columns image, id, x, y[, confirmed].',
     )

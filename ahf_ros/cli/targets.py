@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 
 from ahf_ros.cli import say, tell
-from ahf_ros.cli.options import add_options, settings_from
-from ahf_ros.interchange.files import write_whole
+from ahf_ros.cli.options import add_options, output_path, settings_from
 from ahf_ros.printing.files import geometry_text, sheet_files
 from ahf_ros.printing.settings import SheetSettings
 from ahf_ros.printing.sheets import Sheets
 from ahf_ros.text import counted
+from ahf_ros.writing import write_files, write_whole
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -19,14 +18,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         '-o',
         '--output',
-        type=Path,
+        type=output_path,
         required=True,
         metavar='FILE',
         help='Sheet to write, .pdf or .svg. Several pages of SVG are FILE_1.svg and so on.',
     )
     parser.add_argument(
         '--geometry',
-        type=Path,
+        type=output_path,
         metavar='FILE.json',
         help='Write ID, page and centre of each target and the radii, in mm.',
     )
@@ -34,23 +33,22 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Write the sheets and their geometry, each file independently of the others."""
+    """Write the sheets, all or none, and their geometry."""
     sheets = Sheets(settings_from(options, SheetSettings))
-    failed = False
-    files = list(sheet_files(options.output, sheets))
-    if options.geometry:
-        if options.geometry.resolve() in {path.resolve() for path, _ in files}:
-            raise ValueError(
-                f'geometry is {str(options.geometry)!r}, accepted is a file other than the sheet'
-            )
-        files.append((options.geometry, geometry_text(sheets).encode()))
-    for path, content in files:
-        try:
-            write_whole(path, content)
-        except ValueError as error:
-            tell('targets', error)
-            failed = True
-    if failed:
+    files = dict(sheet_files(options.output, sheets))
+    if options.geometry and options.geometry.resolve() in {path.resolve() for path in files}:
+        raise ValueError(
+            f'geometry is {str(options.geometry)!r}, accepted is a file other than the sheet'
+        )
+    try:
+        if options.geometry:
+            write_whole(options.geometry, geometry_text(sheets).encode())
+        if len(files) == 1:
+            write_whole(*files.popitem())
+        else:
+            write_files(options.output.parent, ((it.name, files[it]) for it in files))
+    except ValueError as error:
+        tell('targets', error)
         return 1
     pages = counted(sheets.count, 'page')
     say(f'{options.output}: {sheets.title}, on {pages} {sheets.settings.paper.name}')

@@ -6,7 +6,6 @@ import argparse
 import sys
 from contextlib import closing, redirect_stdout
 from functools import partial
-from pathlib import Path
 
 from ahf_ros.batch.engine import EngineLost, available_cores
 from ahf_ros.batch.identification import identify_images
@@ -15,13 +14,15 @@ from ahf_ros.batch.task import ImageTask, with_machine
 from ahf_ros.batch.watch import Arrivals, watch
 from ahf_ros.cli import tell
 from ahf_ros.cli.engines import create_engine, shared_settings
-from ahf_ros.cli.identify import check_settings, image_task, print_outcome
+from ahf_ros.cli.identify import check_settings, image_paths, image_task, print_outcome
 from ahf_ros.cli.options import (
     add_image_options,
     add_option,
     add_output_options,
     add_search_options,
     add_target_options,
+    input_path,
+    output_path,
     settings_from,
 )
 from ahf_ros.interchange.files import RESULTS_FILE
@@ -32,10 +33,10 @@ from ahf_ros.settings.parameter import Parameter
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Give a parser the arguments of the command."""
-    parser.add_argument('folder', type=Path, metavar='FOLDER', help='Where images arrive.')
+    parser.add_argument('folder', type=input_path, metavar='FOLDER', help='Where images arrive.')
     parser.add_argument(
         '--output',
-        type=Path,
+        type=output_path,
         required=True,
         metavar='DIR',
         help=f'Write results to {RESULTS_FILE} in this folder. What is there already is not '
@@ -62,6 +63,7 @@ def run(options: argparse.Namespace) -> int:
     output = sys.stdout if options.json else None
     settings = settings_from(options, IdentificationSettings, [options.folder / 'families'])
     _check_overlay(options)
+    image_paths([str(options.folder)])  # which are inputs from now on
     jobs = options.jobs or available_cores()
     shared = shared_settings(settings, jobs, options.scheduler)
 

@@ -8,11 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NoReturn
 
-from ruamel.yaml import YAML
-from ruamel.yaml.comments import CommentedMap, CommentedSeq
-from ruamel.yaml.error import MarkedYAMLError, YAMLError
-
-_MAXIMUM_BYTES = 4_000_000  # bytes; ten thousand codes need a tenth of it
+from ahf_ros.opening import Most, read_text, reader
+from ahf_ros.parsed_yaml import Listing, Mapping, parsed_yaml
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,21 +48,19 @@ class Entry:
 
     def items(self) -> Iterator[tuple[str, Entry]]:
         """Yield keys, as texts, and entries of a mapping."""
-        if not isinstance(self.value, CommentedMap):
+        if not isinstance(self.value, Mapping):
             self.refuse('a mapping')
         for key, value in self.value.items():
-            line = self.value.lc.data[key][2]
+            line = self.value.lines[key]
             field = f'{self.field}.{key}' if self.field else str(key)
-            yield str(key), Entry(self.source, field, line + 1, value)
+            yield str(key), Entry(self.source, field, line, value)
 
     def list(self, accepted: str, lengths: Sequence[int] = ()) -> list[Entry]:
         """Return the entries of a list, of one of some lengths where these are given."""
-        if not isinstance(self.value, CommentedSeq) or (
-            lengths and len(self.value) not in lengths
-        ):
+        if not isinstance(self.value, Listing) or (lengths and len(self.value) not in lengths):
             self.refuse(accepted)
         return [
-            Entry(self.source, f'{self.field}[{index}]', self.value.lc.data[index][0] + 1, value)
+            Entry(self.source, f'{self.field}[{index}]', self.value.lines[index], value)
             for index, value in enumerate(self.value)
         ]
 
@@ -92,33 +87,13 @@ class Entry:
         return str(self.value)
 
 
+@reader('a data file of a family, in YAML or JSON')
 def read_data_file(path: str | Path) -> Entry:
     """Return the content of a YAML or JSON file.
 
     Raise a ValueError that names the line if it is neither, or says why it cannot be read.
     """
-    source = str(path)
-    if Path(path).exists() and not Path(path).is_file():
-        raise ValueError(f'{source} cannot be read: it is not a regular file')
-    try:
-        with Path(path).open('rb') as stream:
-            content = stream.read(_MAXIMUM_BYTES + 1)
-        text = content.decode()
-    except (OSError, UnicodeDecodeError) as error:
-        raise ValueError(f'{source} cannot be read: {error}') from error
-    if len(content) > _MAXIMUM_BYTES:
-        raise ValueError(f'{source} is larger than {_MAXIMUM_BYTES} bytes')
-    try:
-        value = YAML(typ='rt', pure=True).load(text)
-    except MarkedYAMLError as error:
-        mark = error.problem_mark or error.context_mark
-        line = mark.line + 1 if mark else 1
-        problem = str(error.problem).splitlines()[0]
-        raise ValueError(f'{source}, line {line}: {problem}; accepted is JSON or YAML') from error
-    except (YAMLError, ValueError, RecursionError) as error:
-        raise ValueError(f'{source} is neither JSON nor YAML: {error}') from error
-    _refuse_aliases(source, value)
-    return Entry(source, '', 1, value)
+    return Entry(str(path), '', 1, parsed_yaml(read_text(path, Most.YAML), str(path)))
 
 
 def pinhole_in(fields: dict[str, Entry]) -> float:
@@ -126,19 +101,3 @@ def pinhole_in(fields: dict[str, Entry]) -> float:
     accepted = 'a radius from 0 to 0.5 radii of the dot'
     radius = fields['pinhole'].number(accepted, 0.0) if 'pinhole' in fields else 0.0
     return radius if radius <= 0.5 else fields['pinhole'].refuse(accepted)
-
-
-def _refuse_aliases(source: str, value: Any) -> None:
-    """Refuse YAML that holds a part twice: written out, it may be of any size."""
-    seen: set[int] = set()
-    waiting = [value]
-    while waiting:
-        item = waiting.pop()
-        if isinstance(item, (CommentedMap, CommentedSeq)):
-            if id(item) in seen:
-                raise ValueError(
-                    f'{source}, line {item.lc.line + 1}: an alias stands for this part elsewhere, '
-                    'accepted are data without aliases'
-                )
-            seen.add(id(item))
-            waiting += item.values() if isinstance(item, CommentedMap) else item

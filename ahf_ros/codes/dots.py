@@ -18,6 +18,7 @@ import numpy as np
 from ahf_ros.codes.cyclic import CyclicFamily, mirrored_words, smallest_rotation
 from ahf_ros.codes.data_file import pinhole_in, read_data_file
 from ahf_ros.codes.kept import kept_while_unchanged
+from ahf_ros.opening import reader
 
 DOTS_DESIGN = Path(__file__).with_name('dots.json')
 """The design of rings of dots that this package prints."""
@@ -55,6 +56,7 @@ class DotFamily(CyclicFamily):
 
 
 @kept_while_unchanged
+@reader('a data file of rings of dots')
 def dot_family(path: str = '') -> DotFamily:
     """Return the family of rings of dots in a data file; our own where empty.
 

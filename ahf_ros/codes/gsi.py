@@ -18,6 +18,7 @@ import numpy as np
 
 from ahf_ros.codes.data_file import Entry, read_data_file
 from ahf_ros.codes.kept import kept_while_unchanged
+from ahf_ros.opening import reader
 
 GSI_LIBRARY = Path(__file__).with_name('gsi.json')
 """Template, positions and known numbers of GSI's targets."""
@@ -172,6 +173,7 @@ def valid_words(places: Mapping[int, Sequence[float]], rule: Rule) -> np.ndarray
 
 
 @kept_while_unchanged
+@reader('a data file of point-distributed targets')
 def point_family(path: str = '') -> PointFamily:
     """Return the family of point-distributed targets in a data file; GSI's own where empty.
 

@@ -22,6 +22,7 @@ import numpy as np
 from ahf_ros.codes import RING_FOLDER, RING_NAMES, VENDOR_NAMES
 from ahf_ros.codes.cyclic import CyclicFamily, mirrored_words, smallest_rotation
 from ahf_ros.codes.data_file import Entry, pinhole_in, read_data_file
+from ahf_ros.opening import reader
 
 FAMILY_NAMES = VENDOR_NAMES
 """The ring code families that vendors print."""
@@ -93,6 +94,7 @@ def family(name: str) -> Family:
     return ring_family(str(RING_FOLDER / f'{name}.json'))
 
 
+@reader('a data file of rings')
 def ring_family(path: str) -> Family:
     """Return the family of ring codes that a data file describes.
 

@@ -226,6 +226,7 @@ class DetectorSettings:
         'Data files that describe families, separated by commas: more rings, or gsi or dots in '
         'the place of the usual design.',
         read_only=True,
+        files=True,
     )
     polarity: str = parameter(
         'auto',

@@ -67,6 +67,18 @@ def check_size(width: int, height: int, name: str) -> None:
         )
 
 
+def without_gaps(image: np.ndarray) -> np.ndarray:
+    """Return an image in which pixels that are not finite are 0, unless all of them are not.
+
+    Scanners and programs mark missing pixels like that.
+    """
+    if image.dtype.kind == 'f':
+        finite = np.isfinite(image)
+        if finite.any() and not finite.all():
+            return np.where(finite, image, image.dtype.type(0))
+    return image
+
+
 def brightest(image: np.ndarray) -> float:
     """Return the gray value of the brightest light in an image, hot pixels excluded."""
     rank = image.size - 1 - image.size // _HOT_SHARE

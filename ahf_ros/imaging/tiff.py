@@ -1,4 +1,4 @@
-"""The first directory of TIFF 6.0 and BigTIFF files, read without decoding anything."""
+"""The directories of TIFF 6.0 and BigTIFF files, read without decoding anything."""
 
 from __future__ import annotations
 
@@ -7,8 +7,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-_LAYOUTS = {1: 'B', 3: 'H', 4: 'L', 16: 'Q'}  # of integers, by the type of a field
+_LAYOUTS = {
+    1: 'B',
+    3: 'H',
+    4: 'L',
+    13: 'L',
+    16: 'Q',
+    18: 'Q',
+}  # of integers, by the type of a field
 _FIELDS = 4096  # that are read at most
+_DIRECTORIES = 1000  # the same
+_PARTS = 330  # tag of the places of directories that belong to one
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,10 +44,50 @@ def first_directory(content: bytes) -> dict[int, Field]:
 
     A struct.error, a ValueError or an OverflowError says that the directory is not in the file.
     """
-    order = '<' if content[:2] == b'II' else '>'
-    big = content[2:4] in (b'+\0', b'\0+')
-    offset_at, word, count_layout, field = (8, 'Q', 'Q', 'HHQ') if big else (4, 'L', 'H', 'HHL')
-    (start,) = struct.unpack_from(order + word, content, offset_at)
+    order, big = _form(content)
+    place, layout = first_at(content)
+    return _directory(content, struct.unpack_from(layout, content, place)[0], order, big)[0]
+
+
+def first_at(content: bytes) -> tuple[int, str]:
+    """Return where a file says where its first directory is, and the layout for `struct`."""
+    order, big = _form(content)
+    return (8, f'{order}Q') if big else (4, f'{order}L')
+
+
+def directories(content: bytes) -> dict[int, dict[int, Field]]:
+    """Return the fields of all directories by their places: pages, and what is part of these.
+
+    What comes after a damage is left out; errors of the first one are as of `first_directory`.
+    """
+    order, big = _form(content)
+    place, layout = first_at(content)
+    found: dict[int, dict[int, Field]] = {}
+    waiting = [struct.unpack_from(layout, content, place)[0]]
+    while waiting and len(found) < _DIRECTORIES:
+        start = waiting.pop(0)
+        if start == 0 or start in found:
+            continue
+        try:
+            fields, following = _directory(content, start, order, big)
+            parts = fields[_PARTS].values(content).tolist() if _PARTS in fields else []
+        except (struct.error, ValueError, OverflowError):
+            if not found:
+                raise
+            continue
+        found[start] = fields
+        waiting += [*map(int, parts), following]
+    return found
+
+
+def _form(content: bytes) -> tuple[str, bool]:
+    """Return the byte order of a file, and whether it is BigTIFF."""
+    return '<' if content[:2] == b'II' else '>', content[2:4] in (b'+\0', b'\0+')
+
+
+def _directory(content: bytes, start: int, order: str, big: bool) -> tuple[dict[int, Field], int]:
+    """Return the fields of the directory at a place, and the place of the next one or 0."""
+    word, count_layout, field = ('Q', 'Q', 'HHQ') if big else ('L', 'H', 'HHL')
     (count,) = struct.unpack_from(order + count_layout, content, start)
     place = start + struct.calcsize(order + count_layout)
     room = struct.calcsize(order + word)
@@ -52,4 +101,5 @@ def first_directory(content: bytes) -> dict[int, Field]:
             fits = values * struct.calcsize(layout) <= room
             found[tag] = Field(values, place if fits else elsewhere, layout)
         place += room
-    return found
+    following = content[place : place + room]
+    return found, int.from_bytes(following, 'little' if order == '<' else 'big')

@@ -25,9 +25,13 @@ _ALONE = frozenset((0x01, *range(0xD0, 0xD9)))  # markers without a segment
 _AFTER_DATA = re.compile(rb'\xff[\x01-\xcf\xd8-\xfe]')  # the next marker but for restarts
 _PLACES = ((273, 279), (324, 325))  # tags of TIFF: where strips or tiles are, and their sizes
 
-_SAID = re.compile(r'(Corrupt JPEG data|Premature end of JPEG|TIFF_Error).*')
+_SAID = re.compile(r'(Corrupt JPEG data|Premature end of JPEG|TIFF_Error|libpng error).*')
+_LOG = re.compile(r'\[ *(ERROR|WARN):\d+@|libpng warning')  # of decoders
 _PADDED = re.compile(r'(\d+) extraneous bytes before marker 0xd9')
 _PADDING = 16  # bytes after the data of all pixels, as some webcams send them
+
+_LARGEST_PIXEL = 9  # bytes of a PNG: four samples of 16 bit, and what packing may add
+_BESIDE = 2**24  # bytes of a chunk with something else than pixels
 
 _lock = threading.Lock()
 _passed = 0  # bytes that were held back and passed on
@@ -58,7 +62,10 @@ def decoded(data: np.ndarray, flags: int) -> tuple[np.ndarray | None, str]:
     Decoders write to standard error what they fill up, and nowhere else. During a call, what other
     threads write there is held back.
     """
-    seen = damage(data.tobytes())
+    content = data.tobytes()
+    seen = damage(content)
+    if content.startswith(_PNG) and not _is_credible(content):
+        return None, seen
     with _lock, _standard_error() as said:
         image = cv2.imdecode(data, flags)
     for line in said:
@@ -92,10 +99,12 @@ def _standard_error() -> Iterator[list[str]]:
         os.lseek(held, _passed, os.SEEK_SET)  # writes are appended, wherever this is
         written = os.read(held, os.fstat(held).st_size)
         _passed += len(written)
+        logged = False
         for line in written.splitlines(keepends=True):
             text = line.decode(errors='replace')
             lines.append(text)
-            if not _SAID.search(text):
+            logged = bool(_LOG.match(text) or (logged and not text.strip()))
+            if not (logged or _SAID.search(text)):
                 with suppress(OSError):  # nobody reads it any more
                     os.write(original, line)
     finally:
@@ -144,6 +153,22 @@ def _png_damage(data: bytes) -> str:
         if kind == b'IEND':
             return ''
         place += 12 + size
+
+
+def _is_credible(data: bytes) -> bool:
+    """Return whether no chunk of a PNG says that it is larger than all its pixels.
+
+    A decoder takes the memory for a chunk before it looks whether that is there: 4 GB at most.
+    """
+    with suppress(struct.error):
+        width, height = struct.unpack_from('>LL', data, len(_PNG) + 8)
+        place = len(_PNG)
+        while place < len(data):
+            (size,) = struct.unpack_from('>L', data, place)
+            if size > _LARGEST_PIXEL * width * height + _BESIDE:
+                return False
+            place += 12 + size
+    return True
 
 
 def _tiff_damage(data: bytes) -> str:

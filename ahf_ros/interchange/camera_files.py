@@ -11,10 +11,8 @@ from typing import Any
 
 import cv2
 import numpy as np
-from ruamel.yaml import YAML
-from ruamel.yaml.error import YAMLError
 
-from ahf_ros.interchange.files import read_text
+from ahf_ros.opening import LARGEST, Most, read_text, reader
 from ahf_ros.orientation.camera import (
     EQUIDISTANT,
     PARAMETERS,
@@ -23,7 +21,8 @@ from ahf_ros.orientation.camera import (
 )
 from ahf_ros.orientation.network import CameraView, FloatArray
 from ahf_ros.orientation.points import correlations, standard_deviations
-from ahf_ros.text import reason_of, shown
+from ahf_ros.parsed_yaml import parsed_yaml
+from ahf_ros.text import shown
 
 BROWN = ('', 'plumb_bob', 'rational_polynomial')
 """Names of Brown's model; the last one has more coefficients, which it stands for."""
@@ -82,6 +81,7 @@ class CameraFile:
         )
 
 
+@reader('a calibration as ROS, OpenCV or Kalibr write it')
 def read_camera(path: str | Path) -> CameraFile:
     """Return the calibration in a file of ROS (camera_info), OpenCV (FileStorage) or Kalibr.
 
@@ -89,7 +89,7 @@ def read_camera(path: str | Path) -> CameraFile:
     as these agree. A ValueError names the file, and the field that is missing, damaged or of
     another model.
     """
-    content = _without_kalibr(_parsed(read_text(path), str(path)), path)
+    content = _without_kalibr(_parsed(read_text(path, Most.YAML), str(path)), path)
     width, height = (_whole(content, name, path) for name in ('width', 'height'))
     matrix = _numbers(content, 'matrix', path)
     distortion = _numbers(content, 'distortion', path, required=False)
@@ -247,10 +247,7 @@ def _parsed(text: str, path: str) -> dict[str, Any]:
     if lines and lines[0].startswith('%YAML'):
         lines[0] = ''
     text = '\n'.join(lines).replace('!!opencv-matrix', '')
-    try:
-        content = YAML(typ='safe', pure=True).load(text)
-    except (YAMLError, ValueError) as error:
-        raise ValueError(f'{path} is not YAML: {reason_of(error)}') from error
+    content = parsed_yaml(text, path)
     if not isinstance(content, dict):
         raise ValueError(f'{path} has no fields, accepted is a calibration of ROS or OpenCV')
     return content
@@ -305,7 +302,7 @@ def _numbers(
     found = value.get('data') if isinstance(value, dict) else value
     rows = found if isinstance(found, list) else [math.nan]
     flat = [it for row in rows for it in (row if isinstance(row, list) else [row])]
-    if not all(type(it) in (int, float) and math.isfinite(it) for it in flat):
+    if not all(type(it) in (int, float) and abs(it) <= LARGEST for it in flat):
         raise ValueError(
             f'{path}: {_NAMES[name][0]} is {shown(found)}, accepted are finite numbers'
         )

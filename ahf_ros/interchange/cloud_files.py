@@ -20,8 +20,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ahf_ros.interchange.files import read_bytes
 from ahf_ros.interchange.point_clouds import AXES
+from ahf_ros.opening import LARGEST, Most, read_bytes, reader
 from ahf_ros.text import shown
 
 _LONGEST_HEADER = 2**16
@@ -74,6 +74,7 @@ def write_pcd(cloud: np.ndarray) -> bytes:
     return '\n'.join([*lines, '']).encode() + packed.tobytes()
 
 
+@reader('a cloud in PLY or PCD')
 def read_cloud(path: str | Path) -> np.ndarray:
     """Return the cloud in a PLY or PCD file; one that is not organised has a single row.
 
@@ -83,11 +84,7 @@ def read_cloud(path: str | Path) -> np.ndarray:
     suffix = Path(path).suffix.lower()
     if suffix not in readers:
         raise ValueError(f'{path} ends in {suffix!r}, accepted are {", ".join(readers)}')
-    content = read_bytes(path)
-    try:
-        cloud = readers[suffix](content)
-    except ValueError as error:
-        raise ValueError(f'{path}: {error}') from error
+    cloud = readers[suffix](read_bytes(path, Most.CLOUD))
     if missing := [name for name in AXES if name not in (cloud.dtype.names or ())]:
         raise ValueError(f'{path} has no field {missing[0]}, accepted are clouds with x, y and z')
     return cloud
@@ -131,8 +128,10 @@ def _table(data: bytes, kinds: list[tuple[str, str]], count: int, order: str) ->
         words = data.split()
         if len(words) < count * len(kinds):
             raise ValueError(f'{count} points are announced and {len(words)} numbers are there')
-        rows = zip(*[iter(words[: count * len(kinds)])] * len(kinds), strict=True)
-        return np.array([tuple(map(float, row)) for row in rows], kind)
+        table = np.zeros(count, kind)
+        for index, name in enumerate(names):
+            table[name] = _column(words[index : count * len(kinds) : len(kinds)], name, kind[name])
+        return table
     kind = np.dtype([(name, order + it) for name, it in kinds])
     if len(data) < count * kind.itemsize:
         raise ValueError(
@@ -140,6 +139,19 @@ def _table(data: bytes, kinds: list[tuple[str, str]], count: int, order: str) ->
             'there: the file is cut'
         )
     return np.frombuffer(data, kind, count)
+
+
+def _column(words: list[bytes], name: str, kind: np.dtype) -> np.ndarray:
+    """Return the numbers of a field in a text, which its type has to hold; NaN are missing."""
+    found = np.array(words, 'S').astype(float)
+    limits = np.iinfo(kind) if kind.kind in 'iu' else None
+    least, most = (limits.min, limits.max) if limits else (-LARGEST, LARGEST)
+    bad = ~((found >= least) & (found <= most) | (np.isnan(found) & (limits is None)))
+    if bad.any():
+        raise ValueError(
+            f'{shown(name)} is {found[bad][0]:g}, accepted are numbers from {least:g} to {most:g}'
+        )
+    return found
 
 
 def _read_ply(content: bytes) -> np.ndarray:

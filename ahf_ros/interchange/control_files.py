@@ -7,7 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ahf_ros.interchange.tables import Row, one_of, read_table
+from ahf_ros.interchange.tables import POINT, Row, one_of, read_table
+from ahf_ros.opening import reader
 from ahf_ros.orientation.measurement import CalibratedLength
 from ahf_ros.orientation.network import ControlPoint, FloatArray, ScaleBar
 
@@ -17,6 +18,7 @@ _ENTRIES = tuple(f'covariance_{it}' for it in ('xx', 'xy', 'xz', 'yy', 'yz', 'zz
 _MIXED = tuple(f'covariance_{it}' for it in ('xy', 'xz', 'yz'))  # beside sigmas, as in points.csv
 
 
+@reader('a table of scale bars in CSV')
 def read_scale_bars(path: str | Path) -> tuple[ScaleBar, ...]:
     """Return scale bars from a table with id_1, id_2, length, sigma and, perhaps, role."""
     _, rows = read_table(path, ('id_1', 'id_2', 'length', 'sigma'))
@@ -26,6 +28,7 @@ def read_scale_bars(path: str | Path) -> tuple[ScaleBar, ...]:
     )
 
 
+@reader('a table of lengths in CSV')
 def read_lengths(path: str | Path) -> tuple[CalibratedLength, ...]:
     """Return calibrated lengths from a table with id_1, id_2, length and, perhaps, sigma and line.
 
@@ -44,7 +47,7 @@ def read_lengths(path: str | Path) -> tuple[CalibratedLength, ...]:
 
 
 def _ends(row: Row) -> tuple[str, str]:
-    ends = row.text('id_1'), row.text('id_2')
+    ends = row.label('id_1'), row.label('id_2')
     if ends[0] == ends[1]:
         raise ValueError(f'{row.where}: both ends are {ends[0]}, accepted are two targets')
     return ends
@@ -54,6 +57,7 @@ def _is_check(row: Row) -> bool:
     return row.choice('role', _ROLES, 'control') == 'check'
 
 
+@reader('a table of control points in CSV')
 def read_control(path: str | Path, sigma: float = 0.0) -> tuple[ControlPoint, ...]:
     """Return control points from a table with id, x, y, z and, perhaps, role.
 
@@ -61,7 +65,7 @@ def read_control(path: str | Path, sigma: float = 0.0) -> tuple[ControlPoint, ..
     covariance_yz as in our points.csv, or in covariance_xx to covariance_zz. `sigma` counts where
     the table says nothing; 0 fixes a point.
     """
-    columns, rows = read_table(path, ('id', 'x', 'y', 'z'))
+    columns, rows = read_table(path, POINT)
     return control_points(path, columns, rows, sigma)
 
 
@@ -73,7 +77,7 @@ def control_points(
     group = one_of(path, columns, [_SIGMAS, _ENTRIES if whole else ('covariance_xx',)])
     points: dict[str, ControlPoint] = {}
     for row in rows:
-        name = row.text('id')
+        name = row.label('id')
         if name in points:
             raise ValueError(f'{row.where}: {name} is there twice, accepted is one row a point')
         covariance = _covariance(row, group, sigma)

@@ -9,18 +9,17 @@ from pathlib import Path
 import numpy as np
 
 from ahf_ros.interchange.control_files import control_points
-from ahf_ros.interchange.files import read_text
 from ahf_ros.interchange.network_results import read_network
-from ahf_ros.interchange.tables import Row, read_table
-from ahf_ros.interchange.target_json import parsed_json
+from ahf_ros.interchange.tables import POINT, Row, read_table
+from ahf_ros.opening import Most, parsed_json, read_text, reader
 from ahf_ros.orientation.network import ControlPoint
 from ahf_ros.orientation.points import MeasuredPoints
 from ahf_ros.orientation.units import METRES
 from ahf_ros.text import shown
+from ahf_ros.writing import complete
 
-_COLUMNS = ('id', 'x', 'y', 'z')
 
-
+@reader('coordinates of targets: what ahf orient writes, CSV or JSON')
 def read_coordinates(path: str | Path, unit: str = '') -> MeasuredPoints:
     """Return targets with their coordinates and covariance in metres.
 
@@ -30,15 +29,16 @@ def read_coordinates(path: str | Path, unit: str = '') -> MeasuredPoints:
     does not say it. A ValueError names what is missing, damaged, or contradicts the unit.
     """
     file = Path(path)
+    complete(file.parent)
     if file.is_dir() or file.suffix.lower() == '.json':
-        content = None if file.is_dir() else parsed_json(read_text(file), str(file))
+        content = None if file.is_dir() else parsed_json(read_text(file, Most.JSON), str(file))
         if not isinstance(content, dict) or 'covariance_of_points' in content:
             points = read_network(file).points
             said = points.unit
         else:
             points, said = _from_json(content, file)
     else:
-        columns, rows = read_table(file, _COLUMNS)
+        columns, rows = read_table(file, POINT)
         said = _one_unit(rows, file)
         points = _measured(control_points(file, columns, rows))
     return in_metres(points, _chosen(said, unit, file))
@@ -73,7 +73,7 @@ def _from_json(content: Mapping[str, object], file: Path) -> tuple[MeasuredPoint
     rows = []
     for number, point in enumerate(points, start=1):
         where = f'{file}: points {number}'
-        if not isinstance(point, dict) or not point.keys() >= set(_COLUMNS):
+        if not isinstance(point, dict) or not point.keys() >= set(POINT):
             raise ValueError(f'{where} is {shown(point)}, accepted is an object with id, x, y, z')
         if point.keys() != points[0].keys():
             raise ValueError(f'{where}: accepted are the fields of the first point')

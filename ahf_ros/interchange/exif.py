@@ -6,13 +6,12 @@ import math
 import warnings
 from contextlib import suppress
 from dataclasses import dataclass
-from io import BytesIO
 from pathlib import Path
 from typing import Any
 
 from ahf_ros.extras import need
-from ahf_ros.interchange.files import check_regular, is_url, read_bytes
-from ahf_ros.interchange.image_files import MAXIMUM_BYTES
+from ahf_ros.imaging.headers import read_header
+from ahf_ros.opening import Most, opened, reader
 
 FILM_DIAGONAL = math.hypot(36, 24)
 """Diagonal of a film frame, mm, which equivalent focal lengths refer to (CIPA DCG-001)."""
@@ -37,6 +36,7 @@ class Exif:
     pixels: float | None = None
 
 
+@reader('a photograph')
 def read_exif(path: str | Path) -> tuple[Exif, tuple[int, int]]:
     """Return the Exif data of an image file, empty where there are none, and width and height.
 
@@ -46,13 +46,16 @@ def read_exif(path: str | Path) -> tuple[Exif, tuple[int, int]]:
     need('orient', 'PIL')
     from PIL import Image, UnidentifiedImageError
 
-    check_regular(path, MAXIMUM_BYTES)
     try:
-        with warnings.catch_warnings():
+        with opened(path, Most.IMAGE) as file, warnings.catch_warnings():
             warnings.simplefilter('ignore')  # large images, damaged fields
-            with Image.open(BytesIO(read_bytes(path)) if is_url(str(path)) else path) as image:
+            with Image.open(file) as image:
                 size, exif = image.size, image.getexif()
                 fields = {**exif, **exif.get_ifd(_MORE)}
+                if image.format == 'TIFF':  # the first image may be a preview
+                    file.seek(0)
+                    header = read_header(file.read())
+                    size = (header.width, header.height) if header.width else size
     except (UnidentifiedImageError, Image.DecompressionBombError):
         return Exif(), (0, 0)
     except OSError as error:

@@ -1,129 +1,20 @@
-"""Files and URLs, read and written with errors that name them.
-
-URLs are those of whatever storage fsspec reaches: https://, s3://, memory:// and so on.
-"""
+"""Names of files, and tables in CSV in which a spreadsheet computes nothing."""
 
 from __future__ import annotations
 
 import csv
 import io
-import os
-import re
-import sqlite3
-import stat
-import time
-from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
-from contextlib import contextmanager, suppress
-from importlib import import_module
-from pathlib import Path, PurePath
-from typing import Any, BinaryIO
+from collections.abc import Iterable, Sequence
+from pathlib import PurePath
+from typing import Any
 
-from ahf_ros.extras import need
-from ahf_ros.text import printable, reason_of, shown
-
-_fcntl: Any
-try:
-    _fcntl = import_module('fcntl')
-except ImportError:  # on Windows
-    _fcntl = None
+from ahf_ros.text import printable, shown
 
 RESULTS_FILE = 'results.jsonl'
 """Name of the file in a folder that `ahf identify --output` writes."""
 
-_LOCK_FILE = '.lock'
 _APOSTROPHE = "'"
 _FORMULA = frozenset('=+-@')  # how a formula begins; tabs and line ends are escaped
-_TRY_LOCK = 0.1  # s between two attempts
-_URL = re.compile(r'[a-z][a-z0-9+.-]*://', re.IGNORECASE)
-_CHANGED = ('mtime', 'LastModified', 'last_modified', 'updated', 'ETag', 'created')
-"""What storages call the time of the last change, or what stands for it."""
-
-
-@contextmanager
-def file_errors(path: str | Path, action: str) -> Iterator[None]:
-    """Turn errors of the operating system into a ValueError: the file 'cannot be' `action`."""
-    try:
-        yield
-    except OSError as error:
-        raise ValueError(f'{path} cannot be {action}: {error.strerror}') from error
-
-
-@contextmanager
-def locked(folder: str | Path, lock_timeout: float = 0.0) -> Iterator[None]:
-    """Lock a folder against other processes, until this process ends at the latest.
-
-    Raises a ValueError if another process still has locked it after `lock_timeout` s.
-    """
-    limit = time.monotonic() + lock_timeout
-    with _lock_of(folder) as try_lock:
-        while not try_lock():
-            if time.monotonic() >= limit:
-                raise ValueError(f'{folder} is being written by another process')
-            time.sleep(_TRY_LOCK)
-        yield
-
-
-@contextmanager
-def _lock_of(folder: str | Path) -> Iterator[Callable[[], bool]]:
-    """Yield what tries to lock a folder and returns whether it could."""
-    if _fcntl is None:  # folders cannot be locked; a database can, by any process
-        database = sqlite3.connect(Path(folder, _LOCK_FILE), timeout=0, isolation_level=None)
-
-        def locked_database() -> bool:
-            with suppress(sqlite3.OperationalError):
-                database.execute('BEGIN EXCLUSIVE')
-                return True
-            return False
-
-        try:
-            yield locked_database
-        finally:
-            database.close()
-        return
-    descriptor = os.open(folder, os.O_RDONLY)
-
-    def locked_folder() -> bool:
-        with suppress(BlockingIOError):
-            _fcntl.flock(descriptor, _fcntl.LOCK_EX | _fcntl.LOCK_NB)
-            return True
-        return False
-
-    try:
-        yield locked_folder
-    finally:
-        os.close(descriptor)
-
-
-def read_bytes(path: str | Path) -> bytes:
-    """Return the content of a file or URL, or raise a ValueError that names it."""
-    if is_url(str(path)):
-        with _storage(str(path)) as (storage, place):
-            return bytes(storage.cat_file(place))
-    with file_errors(path, 'read'):
-        return Path(path).read_bytes()
-
-
-def check_regular(path: str | Path, most: int) -> None:
-    """Raise a ValueError for a pipe or device, which may never end, and a file over `most` bytes.
-
-    URLs are not looked at.
-    """
-    if is_url(str(path)):
-        return
-    with file_errors(path, 'read'):
-        status = Path(path).stat()
-    if not (stat.S_ISREG(status.st_mode) or stat.S_ISDIR(status.st_mode)):
-        raise ValueError(f'{path} cannot be read: it is not a regular file')
-    if status.st_size > most:
-        raise ValueError(f'{path} has {status.st_size} bytes, accepted are at most {most}')
-
-
-def read_text(path: str | Path) -> str:
-    """Return the text of a UTF-8 file, or raise a ValueError that names the file."""
-    try:
-        return read_bytes(path).decode('utf-8-sig')
-    except UnicodeDecodeError as error:
-        raise ValueError(f'{path} is not in UTF-8, accepted is a text file') from error
 
 
 def checked_file_name(value: Any, name: str) -> str:
@@ -131,12 +22,6 @@ def checked_file_name(value: Any, name: str) -> str:
     if not isinstance(value, str) or not PurePath(value).name:
         raise ValueError(f'{name} is {shown(value)}, accepted is the name of a file')
     return PurePath(value).name
-
-
-def write_whole(path: str | Path, content: bytes) -> None:
-    """Write a file that is never there in part, as `whole_file` does."""
-    with whole_file(path) as file:
-        file.write(content)
 
 
 def csv_table(rows: Iterable[Sequence[object]]) -> bytes:
@@ -178,74 +63,3 @@ def _is_formula(text: str) -> bool:
     except ValueError:
         return True
     return False
-
-
-@contextmanager
-def whole_file(path: str | Path) -> Iterator[BinaryIO]:
-    """Open a file to write that is never there in part, whatever fails.
-
-    An existing file is replaced once the new one is complete, a missing folder is created. What
-    is no ordinary file, such as a pipe, is written to directly. A ValueError names a file that
-    cannot be written.
-    """
-    with file_errors(path, 'written'):
-        final = Path(path).resolve()
-        if final.exists() and not final.is_file():
-            with final.open('wb') as file:
-                yield file
-            return
-        final.parent.mkdir(parents=True, exist_ok=True)
-        part = final.with_name(f'.{final.name[:200]}.{os.getpid()}.part')
-        part.unlink(missing_ok=True)  # of a killed process of that number, as in containers
-        try:
-            with part.open('xb') as file:
-                yield file
-                file.flush()
-                os.fsync(file.fileno())
-            part.replace(final)
-        finally:
-            part.unlink(missing_ok=True)
-
-
-def is_url(name: str) -> bool:
-    """Return whether a name is a URL: 's3://bucket/a.jpg' is one, 'C:/a.jpg' is a path."""
-    return bool(_URL.match(name))
-
-
-def url_fingerprint(url: str) -> str:
-    """Return size and time of change of a file; what of them is not known is None."""
-    with _storage(url) as (storage, place):
-        found = storage.info(place)
-    changed = (found[name] for name in _CHANGED if found.get(name))
-    return f'{found.get("size")} {next(changed, None)}'
-
-
-def urls_named(url: str, suffixes: Collection[str]) -> list[str]:
-    """Return the URLs that a pattern with asterisks or a folder stands for, sorted.
-
-    In a folder, files with one of the endings `suffixes`, in small letters, are meant. A URL that
-    is neither a pattern nor a folder stands for itself.
-    """
-    with _storage(url) as (storage, place):
-        if '*' in place:
-            found = storage.glob(place)
-        elif not url.lower().startswith('http') and storage.isdir(place):
-            found = [it for it in storage.ls(place, detail=False) if it.lower().endswith(suffixes)]
-        else:
-            return [url]
-        return sorted(storage.unstrip_protocol(it) for it in found)
-
-
-@contextmanager
-def _storage(url: str) -> Iterator[tuple[Any, str]]:
-    """Open the storage of a URL, and turn what its driver raises into a ValueError with the URL.
-
-    A driver, or fsspec itself, may not be installed.
-    """
-    try:
-        need('urls')
-        from fsspec.core import url_to_fs
-
-        yield url_to_fs(url, use_listings_cache=False)
-    except Exception as error:
-        raise ValueError(f'{url} cannot be read: {reason_of(error)}') from error

@@ -1,15 +1,9 @@
-"""Images in files, and images that are encoded as in files.
-
-Size and orientation are read from the headers of PNG 1.2, JPEG (ITU-T T.81), TIFF 6.0, BigTIFF and
-BMP with Exif 2.3, before anything is decoded: OpenCV alone takes 1.1 GB for a PNG file of 0.5 MB.
-Pillow, one more dependency, opens neither TIFF files of float64 nor colour ones of float32, and
-does not say where in a file the orientation is.
-"""
+"""Images in files, and images that are encoded as in files."""
 
 from __future__ import annotations
 
+import re
 import struct
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -17,25 +11,30 @@ import cv2
 import numpy as np
 
 from ahf_ros.deprecation import deprecated_arguments
-from ahf_ros.imaging.image import check_size
-from ahf_ros.imaging.tiff import first_directory, is_tiff
+from ahf_ros.imaging.headers import UPRIGHT, read_header
+from ahf_ros.imaging.image import check_size, without_gaps
 from ahf_ros.imaging.whole import decoded
-from ahf_ros.interchange.files import check_regular, read_bytes, write_whole
+from ahf_ros.opening import Most, read_bytes, reader
+from ahf_ros.writing import write_whole
 
 SUFFIXES = ('.bmp', '.jpeg', '.jpg', '.png', '.tif', '.tiff')
 """Endings of the image files that are tested; others are tried."""
 
-MAXIMUM_BYTES = 2**31 - 1
-"""Bytes that an image file may have; OpenCV counts them as an int."""
-
-UPRIGHT = 1
-"""Orientation of an image whose first row is the upper one and whose first column is the left."""
-
 _LAST_ORIENTATION = 8
-_PNG = b'\x89PNG\r\n\x1a\n'
-_WIDTH, _HEIGHT, _ORIENTATION = 256, 257, 274  # tags of TIFF
-_FRAMES = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}  # JPEG markers with the size
-_DAMAGES = struct.error, ValueError, OverflowError  # of headers
+_OTHERS = tuple(
+    (kind, re.compile(begin, re.DOTALL))
+    for kind, begin in (
+        ('HEIC', rb'....ftyp(hei|hev|mif1|msf1)'),
+        ('AVIF', rb'....ftypavi'),
+        ('JPEG XL', rb'\xff\x0a|\0\0\0\x0cJXL '),
+        ('JPEG 2000', rb'\0\0\0\x0cjP  |\xff\x4f\xff\x51'),
+        ('a raw image', rb'....ftypcrx |FUJIFILMCCD-RAW|IIR[OS]|MMOR|IIU\0|FOVb'),
+    )
+)
+"""Formats of cameras that a decoder may not know, by the bytes that they begin with."""
+
+_ACCEPTED = f'accepted is one of {", ".join(SUFFIXES)}'
+_ADVICE = f'{_ACCEPTED}: convert it in full size to 16-bit TIFF or PNG, without lens corrections'
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -89,10 +88,10 @@ def read_image(path: str | Path, *, upright: bool = False) -> np.ndarray:
     return read_noted_image(path, upright=upright).image
 
 
+@reader('an image')
 def read_noted_image(path: str | Path, *, upright: bool = False) -> NotedImage:
     """Return an image as `read_image` does, with what there is to say about its file."""
-    check_regular(path, MAXIMUM_BYTES)
-    noted = _decoded(read_bytes(path), str(path))
+    noted = _decoded(read_bytes(path, Most.IMAGE), str(path))
     if not UPRIGHT < noted.orientation <= _LAST_ORIENTATION:  # cameras write 0 for none
         return noted
     if upright:
@@ -102,7 +101,7 @@ def read_noted_image(path: str | Path, *, upright: bool = False) -> NotedImage:
         image = noted.image
         done, of = 'is not applied', 'the pixels'
     note = f'{path}: orientation {noted.orientation} {done}; coordinates are those of {of}'
-    return replace(noted, image=image, note=note)
+    return replace(noted, image=image, note='; '.join(filter(None, (noted.note, note))))
 
 
 def as_oriented(image: np.ndarray, orientation: int) -> np.ndarray:
@@ -132,12 +131,14 @@ def _decoded(content: bytes, name: str) -> NotedImage:
     if not content:
         raise ValueError(f'{name} is empty, accepted is an image')
     header = read_header(content)
+    if header.raw:
+        raise ValueError(f'{name} is a raw image, {_ADVICE}')
     check_size(header.width, header.height, name)
     stored = np.frombuffer(content, np.uint8)
-    if header.orientation_at and header.orientation != UPRIGHT:
-        # OpenCV applies the orientation of a TIFF file whatever its flags say.
-        stored, (place, layout) = stored.copy(), header.orientation_at
-        struct.pack_into(layout, stored, place, UPRIGHT)
+    if header.changes:
+        stored = stored.copy()
+        for place, layout, value in header.changes:
+            struct.pack_into(layout, stored, place, value)
     flags = cv2.IMREAD_GRAYSCALE | cv2.IMREAD_ANYDEPTH | cv2.IMREAD_IGNORE_ORIENTATION
     try:
         image, damage = decoded(stored, flags)
@@ -145,8 +146,11 @@ def _decoded(content: bytes, name: str) -> NotedImage:
         raise ValueError(f'{name} cannot be decoded: {error.err}') from error
     if image is None:
         what = f'is damaged: {damage}' if damage else 'is not an image, or is damaged'
-        raise ValueError(f'{name} {what}; accepted is one of {", ".join(SUFFIXES)}')
-    return NotedImage(image, header.orientation, damage=damage)
+        if kind := next((kind for kind, begin in _OTHERS if begin.match(content)), ''):
+            raise ValueError(f'{name} is {kind}, {_ADVICE}')
+        raise ValueError(f'{name} {what}; {_ACCEPTED}')
+    note = f'{name} has {header.pages} pages, the first is read' if header.pages > 1 else ''
+    return NotedImage(without_gaps(image), header.orientation, note, damage)
 
 
 def write_image(path: str | Path, image: np.ndarray) -> None:
@@ -177,87 +181,3 @@ def write_image(path: str | Path, image: np.ndarray) -> None:
         raise ValueError(f'{path} has an unknown format, accepted is one of {", ".join(SUFFIXES)}')
     _, encoded = cv2.imencode(path.suffix, image)
     write_whole(path, encoded.tobytes())
-
-
-@dataclass(frozen=True, slots=True)
-class ImageHeader:
-    """What an image file says of itself.
-
-    A width or height of 0 px is not known. `orientation` is as in Exif, 1 to 8. `orientation_at`
-    is its place in a TIFF file and its layout for `struct`.
-    """
-
-    width: int = 0
-    height: int = 0
-    orientation: int = UPRIGHT
-    orientation_at: tuple[int, str] | None = None
-
-
-def read_header(content: bytes) -> ImageHeader:
-    """Return the header of an image file; of a format or file that is not known, an empty one."""
-    with suppress(*_DAMAGES):
-        if content.startswith(_PNG):
-            return _png(content)
-        if content.startswith(b'\xff\xd8'):
-            return _jpeg(content)
-        if is_tiff(content):
-            return _tiff(content)
-        if content.startswith(b'BM'):
-            width, height = struct.unpack_from('<ii', content, 18)
-            return ImageHeader(abs(width), abs(height))
-    return ImageHeader()
-
-
-def _png(content: bytes) -> ImageHeader:
-    width, height = struct.unpack_from('>LL', content, 16)
-    orientation = UPRIGHT
-    place = len(_PNG)
-    while place + 8 <= len(content):
-        size, kind = struct.unpack_from('>L4s', content, place)
-        if kind == b'eXIf':
-            orientation = _exif(content[place + 8 : place + 8 + size])
-        if kind in (b'eXIf', b'IDAT', b'IEND'):
-            break
-        place += 12 + size
-    return ImageHeader(width, height, orientation)
-
-
-def _jpeg(content: bytes) -> ImageHeader:
-    orientation = UPRIGHT
-    place = 2
-    while place + 4 <= len(content) and content[place] == 0xFF:
-        marker = content[place + 1]
-        if marker == 0xFF:  # fills up
-            place += 1
-            continue
-        (size,) = struct.unpack_from('>H', content, place + 2)
-        if marker in _FRAMES:
-            height, width = struct.unpack_from('>HH', content, place + 5)
-            return ImageHeader(width, height, orientation)
-        if marker == 0xE1 and content[place + 4 : place + 10] == b'Exif\0\0':
-            orientation = _exif(content[place + 10 : place + 2 + size])
-        place += 2 + size
-    return ImageHeader(orientation=orientation)
-
-
-def _exif(content: bytes) -> int:
-    """Return the orientation in Exif data, which are a TIFF file without pixels."""
-    with suppress(*_DAMAGES):
-        return _tiff(content).orientation
-    return UPRIGHT
-
-
-def _tiff(content: bytes) -> ImageHeader:
-    """Return what the fields with one integer in the first directory say."""
-    fields = {tag: it for tag, it in first_directory(content).items() if it.count == 1}
-
-    def value(tag: int, default: int) -> int:
-        return int(fields[tag].values(content)[0]) if tag in fields else default
-
-    noted = fields.get(_ORIENTATION)
-    return ImageHeader(
-        value(_WIDTH, 0),
-        value(_HEIGHT, 0),
-        value(_ORIENTATION, UPRIGHT),
-        (noted.place, noted.layout) if noted else None,
-    )

@@ -12,6 +12,7 @@ from typing import Any
 import cv2
 import numpy as np
 
+from ahf_ros.imaging.image import without_gaps
 from ahf_ros.interchange.image_files import NotedImage, decode_bytes
 
 
@@ -34,7 +35,7 @@ class Encoding:
         return self.samples * np.dtype(self.kind).itemsize
 
 
-WITH_PLANES = 'nv21', 'nv24'
+WITH_PLANES = 'nv12', 'nv21', 'nv24', 'i420'
 """Encodings with gray values first, and colours in planes behind them."""
 
 
@@ -101,12 +102,7 @@ def decode_image(message: Any) -> np.ndarray:
             f'data has {len(message.data)} bytes, accepted are {size}: '
             f'{message.height} rows of {message.step} bytes'
         )
-    image = _gray(_samples(message, encoding), encoding)
-    if image.dtype.kind == 'f':
-        finite = np.isfinite(image)
-        if finite.any() and not finite.all():
-            return np.where(finite, image, image.dtype.type(0))
-    return image
+    return without_gaps(_gray(_samples(message, encoding), encoding))
 
 
 def check_rows(message: Any, step: str, minimum: int, row: str) -> None:

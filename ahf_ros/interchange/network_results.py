@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 import io
-import json
 import math
-import zipfile
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from ahf_ros.interchange.arrays import read_arrays
 from ahf_ros.interchange.camera_files import FISHEYE, opencv_yaml, ros_yaml
-from ahf_ros.interchange.files import csv_table, read_bytes, read_text, write_whole
-from ahf_ros.interchange.target_json import parsed_json
+from ahf_ros.interchange.files import csv_table
+from ahf_ros.opening import LARGEST, Most, inside, parsed_json, read_text, reader
 from ahf_ros.orientation.camera import EQUIDISTANT, PARAMETERS, parameters_of
 from ahf_ros.orientation.deviations import bar_deviations, control_deviations
 from ahf_ros.orientation.network import CameraView, FloatArray, IntArray, Rejection
@@ -24,7 +23,9 @@ from ahf_ros.orientation.points import MeasuredPoints, blocks, standard_deviatio
 from ahf_ros.orientation.solution import Solution
 from ahf_ros.orientation.strength import rays_of
 from ahf_ros.orientation.transform import Transform
+from ahf_ros.target_check import MAXIMUM_ID, checked_integer, checked_number
 from ahf_ros.text import shown
+from ahf_ros.writing import check_set, complete, write_set
 
 NETWORK_FILE = 'network.json'
 POINTS_FILE = 'points.csv'
@@ -61,11 +62,15 @@ class OrientedNetwork:
     warnings: tuple[str, ...]
 
 
-def network_files(solution: Solution) -> dict[str, bytes]:
-    """Return network.json, points.csv and the covariance of all points, by the names of the files.
+def write_network(
+    folder: str | Path, solution: Solution, beside: Mapping[str, bytes] | None = None
+) -> tuple[Path, ...]:
+    """Write an adjusted network to a folder as a set of files, and return the paths.
 
-    Photographs and targets that could not be determined are left out, and named in the warnings.
-    A ValueError is raised for a solution with backward distortion.
+    These are network.json, points.csv and the covariance of all points; calibrations, poses,
+    residuals and checks; and what is `beside` them. Photographs and targets that could not be
+    determined are left out, and named in the warnings. A ValueError is raised for a solution with
+    backward distortion.
     """
     solution.check_forward()
     network, values = solution.network, solution.start
@@ -101,28 +106,15 @@ def network_files(solution: Solution) -> dict[str, bytes]:
         ],
         'warnings': [*solution.warnings, *_left_out(solution)],
     }
-    return {
-        NETWORK_FILE: json.dumps(record, indent=1, allow_nan=False).encode() + b'\n',
-        POINTS_FILE: _points_table(points, rays),
-        COVARIANCE_FILE: _archive(points),
-    }
+    files = {POINTS_FILE: _points_table(points, rays), COVARIANCE_FILE: _archive(points)}
+    files |= calibration_files(solution) | tables(solution) | dict(beside or {})
+    return write_set(folder, NETWORK_FILE, record, files.items())
 
 
 def rejections(solution: Solution) -> list[Rejection]:
     """Return what was set aside from the start, and what the adjustment rejected."""
     aside = [it for it in solution.network.set_aside if it not in solution.rejected]
     return [*aside, *solution.rejected]
-
-
-def write_network(folder: str | Path, solution: Solution) -> tuple[Path, ...]:
-    """Write an adjusted network to a folder, each file as a whole, and return the paths.
-
-    These are `network_files`, and calibrations, poses, residuals and checks.
-    """
-    files = network_files(solution) | calibration_files(solution) | tables(solution)
-    for name, content in files.items():
-        write_whole(Path(folder) / name, content)
-    return tuple(Path(folder) / name for name in files)
 
 
 def _cameras(solution: Solution) -> list[dict[str, Any]]:
@@ -188,15 +180,18 @@ def _archive(points: MeasuredPoints) -> bytes:
     return file.getvalue()
 
 
+@reader('what ahf orient of this version writes')
 def read_network(folder: str | Path) -> OrientedNetwork:
     """Return the network that `ahf orient` wrote to a folder, or whose network.json is named.
 
-    A ValueError names what is missing, damaged, or of another version.
+    A ValueError names what is missing, damaged, or of another version or run.
     """
-    path = Path(folder) / NETWORK_FILE if Path(folder).is_dir() else Path(folder)
-    content = parsed_json(read_text(path), str(path))
+    path = inside(Path(folder), NETWORK_FILE) if Path(folder).is_dir() else Path(folder)
+    complete(path.parent)
+    content = parsed_json(read_text(path, Most.JSON), str(path))
     record = _Record(content, str(path))
     points = record.rows('points')
+    check_set(path, content)
     names = tuple(it.text('id') for it in points)
     if twice := [name for name, number in Counter(names).items() if number > 1]:
         raise ValueError(f'{path}: points have {twice[0]!r} twice, accepted is one point an id')
@@ -207,22 +202,19 @@ def read_network(folder: str | Path) -> OrientedNetwork:
         if it.text('camera') not in numbers:
             raise ValueError(f'{it.where}: camera is {shown(it.text("camera"))}, not in cameras')
     xyz = _stacked([[it.number(axis) for axis in 'xyz'] for it in points], (3,))
-    archive = path.parent / record.text('covariance_of_points')
+    archive = inside(path.parent, record.text('covariance_of_points'))
     covariance, scaled = _covariance_of(archive, names)
-    sigma0, redundancy = record.number('sigma0'), int(record.number('redundancy'))
-    try:
-        unit = record.text('unit')
-        measured = MeasuredPoints(names, xyz, covariance, sigma0, redundancy, unit, scaled)
-    except ValueError as error:
-        raise ValueError(f'{path}: {error}') from error
+    sigma0, redundancy = record.number('sigma0'), record.integer('redundancy')
+    unit = record.text('unit')
+    measured = MeasuredPoints(names, xyz, covariance, sigma0, redundancy, unit, scaled)
     return OrientedNetwork(
         points=measured,
-        rays=np.array([int(it.number('rays')) for it in points], np.int64),
+        rays=np.array([it.integer('rays') for it in points], np.int64),
         cameras=tuple(
             CameraView(
                 it.text('name'),
-                int(it.number('width')),
-                int(it.number('height')),
+                it.integer('width'),
+                it.integer('height'),
                 equidistant=_is_equidistant(it),
             )
             for it in cameras
@@ -273,22 +265,15 @@ def _stacked(rows: Sequence[Any], shape: tuple[int, ...]) -> FloatArray:
 
 def _covariance_of(path: Path, names: tuple[str, ...]) -> tuple[FloatArray, bool]:
     """Return the covariance of the points of these names in their order, and if it is scaled."""
-    content = read_bytes(path)
-    try:
-        with np.load(io.BytesIO(content), allow_pickle=False) as archive:
-            ids, covariance = archive['ids'].tolist(), np.array(archive['covariance'], float)
-            scaled = bool(archive['scaled'])
-    except (KeyError, EOFError, ValueError, zipfile.BadZipFile) as error:
-        raise ValueError(f'{path} is damaged, accepted is what ahf orient writes') from error
-    size = 3 * len(ids)
-    if sorted(map(str, ids)) != sorted(names) or covariance.shape != (size, size):
-        raise ValueError(
-            f'{path} is of {len(ids)} points and has the shape {covariance.shape}, accepted is '
-            f'the covariance of the {len(names)} points of {NETWORK_FILE}'
-        )
-    place = {str(name): index for index, name in enumerate(ids)}
+    size = 3 * len(names)
+    shapes = {'ids': ('U', (len(names),)), 'covariance': ('f', (size, size)), 'scaled': ('b', ())}
+    found = read_arrays(path, shapes)
+    place = {name: index for index, name in enumerate(found['ids'].tolist())}
+    if place.keys() != set(names):
+        raise ValueError(f'{path} is of other points, accepted are those of {NETWORK_FILE}')
+    covariance = found['covariance'].astype(float)
     rows = np.array([3 * place[name] + axis for name in names for axis in range(3)], int)
-    return covariance[np.ix_(rows, rows)], scaled
+    return covariance[np.ix_(rows, rows)], bool(found['scaled'])
 
 
 @dataclass(frozen=True)
@@ -314,11 +299,10 @@ class _Record:
 
     def number(self, name: str) -> float:
         value = self.value(name, object)
-        if isinstance(value, bool) or not isinstance(value, (int, float)):
-            raise ValueError(f'{self.where}: {name} is {shown(value)}, accepted is a number')
-        if not math.isfinite(value):
-            raise ValueError(f'{self.where}: {name} is {value}, accepted is a finite number')
-        return float(value)
+        return checked_number(value, f'{self.where}: {name}', -LARGEST, LARGEST)
+
+    def integer(self, name: str) -> int:
+        return checked_integer(self.value(name, object), f'{self.where}: {name}', 0, MAXIMUM_ID)
 
     def record(self, name: str) -> _Record:
         return _Record(self.value(name, dict), f'{self.where}: {name}')
@@ -333,9 +317,9 @@ class _Record:
         value = self.value(name, list)
         try:
             matrix = np.array(value, float)
-        except (TypeError, ValueError):
+        except (TypeError, ValueError, OverflowError):
             matrix = np.full(shape, math.nan)
-        if matrix.shape != shape or not np.isfinite(matrix).all():
+        if matrix.shape != shape or not (np.abs(matrix) <= LARGEST).all():
             raise ValueError(
                 f'{self.where}: {name} is {shown(value)}, accepted are finite numbers in the '
                 f'shape {shape}'

@@ -9,10 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from ahf_ros.interchange.export.survey import measured_image
+from ahf_ros.interchange.export.survey import MAXIMUM_SIDE, measured_image
 from ahf_ros.interchange.files import checked_file_name
 from ahf_ros.interchange.tables import Row, one_of, read_table
 from ahf_ros.interchange.target_json import json_lines
+from ahf_ros.opening import reader
 from ahf_ros.orientation.network import FloatArray
 from ahf_ros.target import UNDECODED
 from ahf_ros.target_check import MAXIMUM_LENGTH_PX
@@ -24,6 +25,8 @@ _PRECISIONS = (
     ('variance_x', 'covariance_xy', 'variance_y'),
 )
 """Columns of a table that say how precise its image points are; one of these groups."""
+
+_SIZE = 'width', 'height'
 
 
 @dataclass(frozen=True)
@@ -53,6 +56,7 @@ class ObservedPhotograph:
     upright: bool = False
 
 
+@reader('results of ahf identify --json, or a table that ends with .csv')
 def read_observations(path: str | Path, origin: float = 0.0) -> tuple[ObservedPhotograph, ...]:
     """Return the photographs in a file with their image points.
 
@@ -112,13 +116,14 @@ def _known(covariance: Sequence[float]) -> FloatArray | None:
 def _of_table(path: str | Path, origin: float) -> list[ObservedPhotograph]:
     columns, rows = read_table(path, ('image', 'id', 'x', 'y'))
     precision = one_of(path, columns, _PRECISIONS)
-    sized = one_of(path, columns, [('width', 'height')]) == 0
+    sized = one_of(path, columns, [_SIZE]) == 0
     points: dict[str, list[ImagePoint]] = {}
     sizes: dict[str, tuple[int, int]] = {}
     for row in rows:
         image = row.text('image')
         checked_file_name(image, f'{row.where}: image')
-        size = (_side(row, 'width'), _side(row, 'height')) if sized else (0, 0)
+        width, height = (row.integer(it, 1, MAXIMUM_SIDE) if sized else 0 for it in _SIZE)
+        size = width, height
         if sizes.setdefault(image, size) != size:
             raise ValueError(
                 f'{row.where}: {image} has the size {size[0]} x {size[1]} px, above it was '
@@ -126,13 +131,6 @@ def _of_table(path: str | Path, origin: float) -> list[ObservedPhotograph]:
             )
         points.setdefault(image, []).append(_point(row, precision, origin))
     return [ObservedPhotograph(name, *sizes[name], tuple(it)) for name, it in points.items()]
-
-
-def _side(row: Row, name: str) -> int:
-    side = row.number(name, 1)
-    if not side.is_integer():
-        raise ValueError(f'{row.where}: {name} is {side:g}, accepted is a whole number of px')
-    return int(side)
 
 
 def _point(row: Row, precision: int, origin: float) -> ImagePoint:
@@ -154,4 +152,4 @@ def _point(row: Row, precision: int, origin: float) -> ImagePoint:
                 f'{row.where}: the covariance is {shown([xx, xy, yy])}, accepted is one that is '
                 'positive definite'
             )
-    return ImagePoint(row.cells.get('family', ''), row.text('id'), (x, y), covariance)
+    return ImagePoint(row.cells.get('family', ''), row.label('id'), (x, y), covariance)

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -11,11 +10,12 @@ from typing import Any
 import numpy as np
 
 from ahf_ros.interchange.cloud_files import write_pcd, write_ply
-from ahf_ros.interchange.files import csv_table, write_whole
+from ahf_ros.interchange.files import csv_table
 from ahf_ros.interchange.point_clouds import AXES
 from ahf_ros.orientation.network import FloatArray
 from ahf_ros.orientation.transform import Transform
 from ahf_ros.registration.field import Field, RegisteredScan
+from ahf_ros.writing import write_set
 
 TRANSFORMS_JSON, TRANSFORMS_CSV, TARGETS_CSV = 'transforms.json', 'transforms.csv', 'targets.csv'
 
@@ -56,37 +56,26 @@ def write_registration(
     field: Field,
     records: Sequence[ScanRecord],
     clouds: Iterable[np.ndarray | None],
-) -> list[Path]:
-    """Write the scans of a field to a folder, each file as a whole, and return the paths.
+) -> tuple[Path, ...]:
+    """Write the scans of a field to a folder as a set of files, and return the paths.
 
     There are one record and one cloud, an array (height, width), or None for each scan. Clouds are
     taken one after the other. Each becomes a PLY and a PCD file with the name of its scan, in the
     common frame.
     """
-    paths = []
-    for record, scan, cloud in zip(records, field.scans, clouds, strict=True):
-        if cloud is None:
-            continue
-        moved = in_common_frame(cloud, scan.transform)
-        for suffix, write in (('.ply', write_ply), ('.pcd', write_pcd)):
-            paths.append(Path(folder) / f'{record.name}{suffix}')
-            write_whole(paths[-1], write(moved))
-    files = {
-        TRANSFORMS_JSON: _as_json(frame, field, records),
-        TRANSFORMS_CSV: _as_table(field, records),
-        TARGETS_CSV: _targets(field),
-    }
-    for name, content in files.items():
-        paths.append(Path(folder) / name)
-        write_whole(paths[-1], content)
-    return paths
 
+    def files() -> Iterator[tuple[str, bytes]]:
+        for record, scan, cloud in zip(records, field.scans, clouds, strict=True):
+            if cloud is not None:
+                moved = in_common_frame(cloud, scan.transform)
+                yield f'{record.name}.ply', write_ply(moved)
+                yield f'{record.name}.pcd', write_pcd(moved)
+        yield TRANSFORMS_CSV, _as_table(field, records)
+        yield TARGETS_CSV, _targets(field)
 
-def _as_json(frame: str, field: Field, records: Sequence[ScanRecord]) -> bytes:
-    """Return the transforms as JSON: from the frame of each scan into the common one."""
     scans = [_scan(record, scan) for record, scan in zip(records, field.scans, strict=True)]
-    content = {'version': 1, 'unit': 'm', 'frame': frame, 'scans': scans}
-    return (json.dumps(content, indent=1, allow_nan=False) + '\n').encode()
+    about = {'version': 1, 'unit': 'm', 'frame': frame, 'scans': scans}
+    return write_set(folder, TRANSFORMS_JSON, about, files())
 
 
 def _scan(record: ScanRecord, scan: RegisteredScan) -> dict[str, Any]:

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from ahf_ros.interchange.files import write_whole
 from ahf_ros.interchange.tables import Row, one_of, read_by_image, read_table
+from ahf_ros.opening import reader
 from ahf_ros.orientation.camera import rotation_matrices
 from ahf_ros.orientation.network import FloatArray
 from ahf_ros.orientation.transform import Transform, rotation_vector
@@ -24,6 +24,7 @@ _UNIT = 1e-3  # deviation from 1 of the length of a rounded quaternion
 _LARGEST_VECTOR = 2 * np.pi
 
 
+@reader('a table of poses in CSV')
 def read_robot_poses(path: str | Path) -> dict[str, Transform]:
     """Return the pose of the hand in the frame of the base at each image.
 
@@ -86,8 +87,8 @@ def transform_record(parent: str, child: str, pose: Transform) -> dict[str, Any]
     }
 
 
-def write_mounting(folder: str | Path, record: dict[str, Any]) -> tuple[Path, ...]:
-    """Write mounting.json and a launch file of its transforms, and return the paths."""
+def mounting_files(record: dict[str, Any]) -> dict[str, bytes]:
+    """Return mounting.json and a launch file of its transforms, by the names of the files."""
     lines = ['launch:']
     for transform in record['transforms']:
         numbers = [*transform['translation'], *transform['rotation']]
@@ -101,10 +102,7 @@ def write_mounting(folder: str | Path, record: dict[str, Any]) -> tuple[Path, ..
             f'    name: {parent}_to_{child}',
             f'    args: "{" ".join(values)} --frame-id {parent} --child-frame-id {child}"',
         ]
-    files = {
-        MOUNTING_FILE: json.dumps(record, indent=1, allow_nan=False) + '\n',
-        LAUNCH_FILE: '\n'.join(lines) + '\n',
+    return {
+        MOUNTING_FILE: json.dumps(record, indent=1, allow_nan=False).encode() + b'\n',
+        LAUNCH_FILE: '\n'.join(lines).encode() + b'\n',
     }
-    for name, text in files.items():
-        write_whole(Path(folder) / name, text.encode())
-    return tuple(Path(folder) / name for name in files)

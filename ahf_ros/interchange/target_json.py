@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, fields
@@ -11,7 +10,8 @@ from typing import Any
 
 from ahf_ros.codes.families import code_reading
 from ahf_ros.doubt import doubt
-from ahf_ros.interchange.files import RESULTS_FILE, checked_file_name, read_text
+from ahf_ros.interchange.files import RESULTS_FILE, checked_file_name
+from ahf_ros.opening import Most, parsed_json, read_text, reader
 from ahf_ros.target import DottedTarget, Identification, SquareMarker, Target, UndecodedTarget
 from ahf_ros.target_check import (
     MAXIMUM_ID,
@@ -27,12 +27,7 @@ _NAMES = [it.name for it in fields(Target)]
 _ABSENT = {'id': None, 'x': None, 'y': None, 'code': 0, 'semi_major': 0.0, 'semi_minor': 0.0}
 """What the fields of a target without a default are where they are not given."""
 
-_REASONS = (
-    'unread',
-    'uncertain',
-    'contested',
-    'unsettled',
-)  # see `ahf_ros.target.UndecodedTarget`
+_REASONS = 'unread', 'uncertain', 'contested', 'unsettled'  # see `UndecodedTarget`
 _MAXIMUM_DOTS = 1000  # of one target
 
 
@@ -131,6 +126,7 @@ def targets_from_json(content: Any, name: str) -> list[Target]:
     ]
 
 
+@reader('results of ahf identify --json')
 def read_results(path: str | Path) -> dict[str, tuple[Target, ...]]:
     """Return what was identified in each image, by its name without folders.
 
@@ -169,19 +165,11 @@ def json_lines(path: str | Path) -> Iterator[tuple[str, Any]]:
             raise ValueError(f'- cannot be read: {reason_of(error)}') from error
     else:
         path = Path(path) / RESULTS_FILE if Path(path).is_dir() else path
-        text = read_text(path)
+        text = read_text(path, Most.JSON)
     for number, line in enumerate(text.splitlines(), start=1):
         if line.strip():
             where = f'{path}, line {number}'
             yield where, parsed_json(line, where)
-
-
-def parsed_json(text: str, where: str) -> Any:
-    """Return the value of a JSON text, or raise a ValueError that calls it `where`."""
-    try:
-        return json.loads(text)
-    except (ValueError, RecursionError) as error:  # also too deep, or a number too long
-        raise ValueError(f'{where} is not JSON: {reason_of(error)}') from error
 
 
 def _of_its_kind(target: Target, item: dict[str, Any], name: str) -> Target:

@@ -2,56 +2,35 @@
 
 from __future__ import annotations
 
-import csv
-import math
 from pathlib import Path
-from typing import Any
 
-from ahf_ros.interchange.files import (
-    checked_file_name,
-    csv_table,
-    csv_text,
-    read_text,
-    write_whole,
-)
+from ahf_ros.interchange.files import checked_file_name, csv_table
+from ahf_ros.interchange.tables import Row, read_table
+from ahf_ros.opening import reader
 from ahf_ros.target import UNDECODED, TrueTarget, Truth
 from ahf_ros.target_check import MAXIMUM_ID, MAXIMUM_LENGTH_PX
-from ahf_ros.text import shown
-
-_LIMITS = {
-    'id': (UNDECODED, MAXIMUM_ID),
-    'x': (-MAXIMUM_LENGTH_PX, MAXIMUM_LENGTH_PX),
-    'y': (-MAXIMUM_LENGTH_PX, MAXIMUM_LENGTH_PX),
-    'confirmed': (0, 1),
-}
-"""Columns with numbers, and what is accepted in them: integers if the limits are integers."""
+from ahf_ros.writing import write_whole
 
 
+@reader('a table of true targets in CSV')
 def read_truth(path: str | Path) -> dict[str, tuple[TrueTarget, ...]]:
-    """Return the targets that images show, from a CSV file in UTF-8.
+    """Return the targets that images show, from a CSV file.
 
     Its header names the columns image, id, x, y and, optionally, confirmed (1 or 0), in any order;
     other columns are ignored, and so are the folders of an image. A ValueError names a file or
     line that is not like that.
     """
-    rows = csv.DictReader(read_text(path).splitlines())
+    _, rows = read_table(path, ('image', 'id', 'x', 'y'), empty=True)
     truth: dict[str, list[TrueTarget]] = {}
     images: dict[str, str] = {}
-    try:
-        missing = {'image', 'id', 'x', 'y'} - set(rows.fieldnames or ())
-        if missing:
-            raise ValueError(f'{path} has no column {", ".join(sorted(missing))}')
-        for row in rows:
-            where = f'{path}, line {rows.line_num}'
-            image = csv_text(row['image'] or '')
-            name = checked_file_name(image, f'{where}: image')
-            if images.setdefault(name, image) != image:
-                raise ValueError(
-                    f'{where}: {name} is in two folders, accepted is one image a name'
-                )
-            truth.setdefault(name, []).append(_target(row, where))
-    except csv.Error as error:
-        raise ValueError(f'{path}, line {rows.line_num + 1}: {error}') from error
+    for row in rows:
+        image = row.text('image')
+        name = checked_file_name(image, f'{row.where}: image')
+        if images.setdefault(name, image) != image:
+            raise ValueError(
+                f'{row.where}: {name} is in two folders, accepted is one image a name'
+            )
+        truth.setdefault(name, []).append(_target(row))
     return {name: tuple(targets) for name, targets in truth.items()}
 
 
@@ -68,20 +47,7 @@ def write_truth(path: str | Path, truth: Truth) -> None:
     write_whole(path, csv_table(rows))
 
 
-def _target(row: dict[str, Any], where: str) -> TrueTarget:
-    values = {}
-    for name, (minimum, maximum) in _LIMITS.items():
-        text = row.get(name, 1)  # only `confirmed` may be missing
-        whole = isinstance(minimum, int)
-        try:
-            number = int(text) if whole else float(text)
-        except (TypeError, ValueError):
-            number = math.nan
-        if not minimum <= number <= maximum:
-            raise ValueError(
-                f'{where}: {name} is {shown(text)}, accepted is '
-                f'{"an integer" if whole else "a number"} from {minimum:.10g} to {maximum:.10g}'
-            )
-        values[name] = number
-    confirmed = values['confirmed'] == 1
-    return TrueTarget(int(values['id']), values['x'], values['y'], confirmed)
+def _target(row: Row) -> TrueTarget:
+    x, y = (row.number(axis, -MAXIMUM_LENGTH_PX, MAXIMUM_LENGTH_PX) for axis in 'xy')
+    confirmed = 'confirmed' not in row.cells or row.integer('confirmed', 0, 1) == 1
+    return TrueTarget(row.integer('id', UNDECODED, MAXIMUM_ID), x, y, confirmed)

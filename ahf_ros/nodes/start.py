@@ -10,6 +10,7 @@ from functools import partial
 from pkgutil import resolve_name
 
 from ahf_ros.ending import has_arrived, ignore_ending, signalled
+from ahf_ros.inputs import inputs_kept
 from ahf_ros.text import printable
 
 NODES = {
@@ -61,7 +62,8 @@ def start(node: str, arguments: list[str] | None = None) -> int:
     if has_arrived():
         ignore_ending()
         return 0
-    _status = run(node_class, arguments)
+    with inputs_kept():
+        _status = run(node_class, arguments)
     return _status
 
 

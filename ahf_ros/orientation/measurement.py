@@ -16,6 +16,7 @@ import numpy as np
 from ahf_ros.orientation.alignment import Alignment
 from ahf_ros.orientation.network import FloatArray
 from ahf_ros.orientation.points import MeasuredPoints, blocks, entries, standard_deviations
+from ahf_ros.orientation.units import other_unit
 from ahf_ros.text import counted
 
 LINES, LENGTHS_A_LINE, SHARE_OF_DIAGONAL = 7, 5, 2 / 3
@@ -156,6 +157,15 @@ def deviations(alignment: Alignment, nominal: Mapping[str, FloatArray]) -> list[
             difference = points.xyz[index] - nominal[name]
             found.append(Deviation(name, difference, own[index], name in alignment.used))
     return found
+
+
+def unit_remark(points: MeasuredPoints, nominal: Mapping[str, FloatArray]) -> str:
+    """Return a remark on nominal coordinates that seem to be in another unit, empty on others."""
+    both = {name: index for index, name in enumerate(points.names) if name in nominal}
+    if len(both) < 2:
+        return ''
+    given = _diagonal(np.array([nominal[name] for name in both]))
+    return other_unit(given, _diagonal(points.xyz[list(both.values())]), points.unit)
 
 
 def length_errors(

@@ -13,6 +13,7 @@ METRES = {
 """Their names, and how many metres they are."""
 
 _SMALLEST, _LARGEST = 0.01, 2000.0  # m, of objects that are photographed for coordinates
+_ALIKE = 1.2  # ratio of two sizes of one object
 
 
 def unlikely(size: float, unit: str) -> str | None:
@@ -26,3 +27,23 @@ def unlikely(size: float, unit: str) -> str | None:
     likely = [it for it in ('mm', 'm') if _SMALLEST <= size * METRES[it] <= _LARGEST]
     asked = f': is it {" or ".join(likely)}?' if likely else ''
     return f'unit is {unit}, which makes the object {size:.3g} {unit} large{asked}'
+
+
+def other_unit(given: float, measured: float, unit: str) -> str:
+    """Return a remark on given coordinates that seem to be in another unit than measured ones.
+
+    Both are the size of the same object; it is empty where these agree or no unit explains them.
+
+    >>> other_unit(0.9, 901.2, 'mm')
+    'given coordinates spread over 0.9, measured ones over 901 mm: are those in m?'
+    """
+    sizes = {it: given * METRES[it] for it in METRES if unit in METRES}
+    if not sizes or not measured > 0 or _alike(sizes[unit], measured * METRES[unit]):
+        return ''
+    likely = [it for it, size in sizes.items() if _alike(size, measured * METRES[unit])]
+    spread = f'given coordinates spread over {given:.3g}, measured ones over {measured:.3g} {unit}'
+    return f'{spread}: are those in {likely[0]}?' if likely else ''
+
+
+def _alike(one: float, other: float) -> bool:
+    return 1 / _ALIKE < one / other < _ALIKE

@@ -19,7 +19,9 @@ class SheetSettings:
     """Targets to print, and the pages that they are printed on."""
 
     family: str = parameter('metashape12', 'Family of the targets.', form=ONE)
-    family_file: str = parameter('', 'Data files that describe families, as for the detector.')
+    family_file: str = parameter(
+        '', 'Data files that describe families, as for the detector.', files=True
+    )
     ids: str = parameter('', 'IDs and ranges of IDs, such as 1-54, 60; empty: all of the family.')
     best: int = parameter(
         0,

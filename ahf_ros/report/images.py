@@ -17,6 +17,7 @@ import numpy as np
 from ahf_ros.filtering.homomorphic import FilterSettings, HomomorphicFilter
 from ahf_ros.imaging.image import stretched_to_8_bit
 from ahf_ros.imaging.stack import ImageStack, unlike
+from ahf_ros.inputs import register_input
 from ahf_ros.interchange.image_files import read_image
 from ahf_ros.report.results import ImageResult
 
@@ -59,6 +60,7 @@ def find_image(image: str, source: Path, folders: Sequence[Path] = ()) -> Path:
     places += [Path(path), beside / path, beside.parent / path]
     for place in places:
         if place.is_file():
+            register_input(place)
             return place
     where = f' or in {", ".join(map(str, folders))}' if folders else '; --images says where it is'
     raise ValueError(f'{image} is not there{where}')

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ahf_ros.interchange.files import write_whole
 from ahf_ros.orientation.camera import parameters_of
 from ahf_ros.orientation.points import correlations, standard_deviations
 from ahf_ros.orientation.solution import Solution
@@ -32,18 +30,16 @@ _PICTURES = 60  # photographs whose residuals are drawn: those with the largest 
 _CORRELATED = 0.7  # correlation of two parameters of a camera that is listed
 
 
-def write_network_page(path: Path, solution: Solution, title: str) -> None:
-    """Write the page of a network to a file that is never there in part.
-
-    A ValueError says so if the file cannot be written, or jinja2 is not installed.
-    """
+def network_page(solution: Solution, title: str) -> bytes:
+    """Return the page of a network; raises a `MissingExtra` without jinja2."""
     text = page_template('network.html').render(
         title=title,
         style=page_style('network.css'),
         script=page_script(('network',)),
         **_content(solution),
     )
-    write_whole(path, text.encode('utf-8', 'backslashreplace'))
+    encoded: bytes = text.encode('utf-8', 'backslashreplace')
+    return encoded
 
 
 def _content(solution: Solution) -> dict[str, Any]:

@@ -25,7 +25,7 @@ from ahf_ros.doubt import DOUBTFUL_BELOW, doubt
 from ahf_ros.edge_shift import edge_shift_remark
 from ahf_ros.evaluation import FALSE, RIGHT, WRONG, judge
 from ahf_ros.extras import need
-from ahf_ros.interchange.files import whole_file
+from ahf_ros.opening import parsing
 from ahf_ros.report.images import Picture, fitted, shown_image, thumbnail
 from ahf_ros.report.results import ImageResult
 from ahf_ros.settings.parameter import check_parameters, parameter
@@ -40,6 +40,7 @@ from ahf_ros.target import (
     count_codes,
 )
 from ahf_ros.text import printable, reason_of
+from ahf_ros.writing import whole_file
 
 _PAGE = Path(__file__).parent / 'page'  # the template, and the styles and scripts that it holds
 _SCRIPTS = ('data', 'table', 'viewer', 'plots', 'details', 'overview', 'main')  # in their order
@@ -310,7 +311,8 @@ def page_template(name: str) -> Any:
 
 def _advice(result: ImageResult, folders: Sequence[Path]) -> list[str]:
     """Return what may help with an image in which nothing was identified."""
-    with suppress(ValueError):  # an image that is not there is named with its picture
+    # An image that is not there, or cannot be shown, is named with its picture.
+    with suppress(ValueError), parsing(result.image, 'an image that can be shown'):
         wanted = DetectorSettings(family=result.family)
         return advice(shown_image(result, folders)[0], wanted, result.expected)
     return []
@@ -327,15 +329,16 @@ def _limits(available: int, results: Sequence[ImageResult]) -> list[int]:
 
 def _pictures(result: ImageResult, limit: int, folders: Sequence[Path]) -> dict[str, Picture]:
     """Return the pictures of an image by what they are; the large ones fit into the limit."""
-    original, filtered = shown_image(result, folders)
-    pictures = {'thumbnail': thumbnail(original)}
-    if filtered is None:
-        pictures['original'] = fitted(original, limit)
-    else:
-        part = int(limit / (1 + _FILTERED_WEIGHT))
-        pictures['original'] = fitted(original, part)
-        pictures['filtered'] = fitted(filtered, limit - part)
-    return pictures
+    with parsing(result.image, 'an image that can be shown'):
+        original, filtered = shown_image(result, folders)
+        pictures = {'thumbnail': thumbnail(original)}
+        if filtered is None:
+            pictures['original'] = fitted(original, limit)
+        else:
+            part = int(limit / (1 + _FILTERED_WEIGHT))
+            pictures['original'] = fitted(original, part)
+            pictures['filtered'] = fitted(filtered, limit - part)
+        return pictures
 
 
 def script_json(value: Any) -> str:

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from ahf_ros.interchange.files import file_errors, read_bytes
-from ahf_ros.interchange.target_json import RESULTS_FILE, parsed_json, targets_from_json
+from ahf_ros.interchange.target_json import RESULTS_FILE, targets_from_json
+from ahf_ros.opening import LARGEST, Most, file_errors, parsed_json, parsing, read_text
 from ahf_ros.target import UNDECODED, FilterState, SearchTrace, Target
 from ahf_ros.target_check import MAXIMUM_ID, checked_integer, checked_number
 from ahf_ros.text import shown
@@ -157,14 +156,14 @@ class _Record:
 
     def number(self, name: str) -> float:
         name, value = f'{self.where}: {name}', self.content.get(name, 0)
-        return checked_number(value, name, -math.inf, math.inf)
+        return checked_number(value, name, -LARGEST, LARGEST)
 
     def numbers(self, name: str) -> tuple[float, ...]:
         values = self.content.get(name) or []
         if not isinstance(values, list) or len(values) > _MAXIMUM_FILTERS:
             raise ValueError(f'{self.where}: {name} is {shown(values)}, accepted is a list')
         called = f'{self.where}: {name}'
-        return tuple(checked_number(it, called, -math.inf, math.inf) for it in values)
+        return tuple(checked_number(it, called, -LARGEST, LARGEST) for it in values)
 
 
 def read_results(paths: Sequence[str | Path]) -> tuple[list[ImageResult], list[str]]:
@@ -185,7 +184,7 @@ def read_results(paths: Sequence[str | Path]) -> tuple[list[ImageResult], list[s
         for where, content in _contents(file, problems):
             if isinstance(content, dict) and 'image' not in content:
                 continue
-            with _noted(problems):
+            with _noted(problems), parsing(where, 'a result of ahf identify --json'):
                 result = result_from_json(content, file, where)
                 key = result.image, *result.images
                 results.pop(key, None)
@@ -217,23 +216,19 @@ def _files(path: Path) -> list[Path]:
 
 def _contents(file: Path, problems: list[str]) -> Iterator[tuple[str, Any]]:
     """Yield the values in a file and what errors call them; append what is wrong with others."""
-    content = b''
+    text = ''
     with _noted(problems):
-        content = read_bytes(file)
+        text = read_text(file, Most.JSON)
     if file.suffix.lower() == '.json':
         with suppress(ValueError):  # perhaps one object a line
-            whole = parsed_json(content.decode('utf-8-sig'), str(file))
+            whole = parsed_json(text, str(file))
             if isinstance(whole, list):
                 yield from ((f'{file}, item {number}', it) for number, it in enumerate(whole, 1))
             else:
                 yield str(file), whole
             return
-    for number, line in enumerate(content.splitlines(), start=1):
+    for number, line in enumerate(text.splitlines(), start=1):
         where = f'{file}, line {number}'
         if line.strip():
-            try:
-                yield where, parsed_json(line.decode('utf-8-sig'), where)
-            except UnicodeDecodeError:
-                problems.append(f'{where} is not in UTF-8, accepted is JSON')
-            except ValueError as error:
-                problems.append(str(error))
+            with _noted(problems):
+                yield where, parsed_json(line, where)

@@ -29,6 +29,7 @@ class Parameter:
     The description is one sentence, with the unit if there is one. Bounds are closed. No `choices`
     means that any text is accepted. A node takes a `read_only` one at its start only. `form`
     describes accepted texts that the settings check, where `choices` and type do not say it.
+    `files` says that a text names files to read, separated by commas.
     """
 
     name: str
@@ -39,6 +40,7 @@ class Parameter:
     choices: tuple[str, ...] = ()
     read_only: bool = False
     form: str = ''
+    files: bool = False
 
     @property
     def accepted(self) -> str:
@@ -109,6 +111,7 @@ def parameter(
     choices: Iterable[str] = (),
     read_only: bool = False,
     form: str = '',
+    files: bool = False,
 ) -> Any:
     """Return a dataclass field that carries a `Parameter`."""
     item = Parameter(
@@ -120,6 +123,7 @@ def parameter(
         choices=tuple(choices),
         read_only=read_only,
         form=form,
+        files=files,
     )
     return field(default=default, metadata={_KEY: item})
 

@@ -51,7 +51,9 @@ class SceneSettings:
     height: int = parameter(2656, 'Height of the image, px.', minimum=16, maximum=20000)
     targets: int = parameter(54, 'Number of coded targets in the image.', minimum=0)
     family: str = parameter('metashape12', 'Family of the codes.', form=ONE)
-    family_file: str = parameter('', 'Data files that describe families, as for the detector.')
+    family_file: str = parameter(
+        '', 'Data files that describe families, as for the detector.', files=True
+    )
     polarity: str = parameter(
         'auto',
         'Dark targets on white, or bright ones on black; auto: as the family, dark where it may '

@@ -21,7 +21,7 @@ from ahf_ros.bag import output, run
 from ahf_ros.bag.definitions import COMPRESSED_IMAGE, IMAGE, typestore
 from ahf_ros.cli import main
 from ahf_ros.synthetic.scene import Rendering, SceneSettings, render
-from support import bags
+from support import bags, mcap
 
 ROOT = Path(__file__).resolve().parents[2]
 PATIENCE = 300.0
@@ -154,6 +154,29 @@ def test_topics_are_chosen_and_compressed_images_are_images_too(
     assert status(source, one, '--topic', '/right', '--output-topic', '/targets', *FAMILY) == 0
     ids = [[it.id for it in message.targets] for _, message in bags.answers(one, '/targets')]
     assert ids == [[it.id for it in message.targets] for _, message in right]
+
+
+def test_depth_and_video_are_left_out_by_name(
+    images: list[np.ndarray], tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    messages = bags.recorded(typestore(), images[:2])
+    depth = bags.compressed(typestore(), images[0], 10**9)
+    messages.append(('/depth/compressedDepth', COMPRESSED_IMAGE, 10**9, depth))
+    source = bags.write_ros2(tmp_path / 'in', messages)
+    assert status(source, tmp_path / 'out', *FAMILY) == 0
+    assert 'left out: answers to /depth/compressedDepth, which has depth' in capfd.readouterr().err
+    assert len(bags.answers(tmp_path / 'out')) == 2
+    assert status(source, tmp_path / 'none', '--topic', '/depth/compressedDepth') == 1
+    assert 'topic /depth/compressedDepth has depth images' in capfd.readouterr().err
+    kind = 'foxglove_msgs/msg/CompressedVideo'
+    video = [
+        mcap.schema(1, kind, 'ros2msg', 'string format'),
+        mcap.channel(1, 1, '/video'),
+        mcap.message(1, 10**9, bytes(12)),
+    ]
+    path = mcap.McapFile(video).write(tmp_path / 'video.mcap')
+    assert status(path, tmp_path / 'video') == 1
+    assert f'/video has video of {kind}: decode it' in capfd.readouterr().err
 
 
 def test_several_bags_at_once(recording: Path, answered: Path, tmp_path: Path) -> None:

@@ -337,9 +337,9 @@ def test_a_file_that_is_none_is_refused(tmp_path: Path, run: Run) -> None:
 @pytest.mark.parametrize(
     ('metadata', 'reason'),
     [
-        ('[' * 1500, 'RecursionError'),
+        ('[' * 1500, ', line 1: it is nested too deep'),
         ('rosbag2_bagfile_information: {topics_with_message_count: [{topic_metadata: '
-         '{name: /image}, message_count: .inf}]}', 'OverflowError'),
+         '{name: /image}, message_count: .inf}]}', ' is damaged'),
     ],
 )  # fmt: skip
 def test_metadata_of_any_content_are_named(
@@ -350,7 +350,7 @@ def test_metadata_of_any_content_are_named(
 ) -> None:
     source = recorded(tmp_path)
     (source / 'metadata.yaml').write_text(metadata)
-    assert f'metadata.yaml: {reason}' in run(source, 1)
+    assert f'metadata.yaml{reason}' in run(source, 1)
     assert len(bags.answers(tmp_path / 'out')) == COUNT
 
 

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import os
+import sqlite3
 from contextlib import closing
 from pathlib import Path
 
@@ -51,3 +53,34 @@ def test_a_journal_that_was_not_begun_is_none(tmp_path: Path) -> None:
     assert begun_with(tmp_path) == ''
     begin(tmp_path, 'told')
     assert begun_with(tmp_path) == 'told'
+
+
+@pytest.mark.parametrize(
+    'change',
+    [
+        'DELETE FROM outputs WHERE image = 1 AND number = 1',
+        "UPDATE outputs SET data = X'00' WHERE image = 1 AND number = 0",
+        "UPDATE images SET entry = replace(entry, '/image', '/other') WHERE number = 1",
+        'DELETE FROM images WHERE number = 1',
+        'UPDATE images SET entry = NULL WHERE number = 1',
+    ],
+)
+def test_what_was_changed_in_a_journal_is_named(tmp_path: Path, change: str) -> None:
+    begin(tmp_path, 'told')
+    with closing(Journal(tmp_path)) as journal:
+        for entry in ENTRIES[:3]:
+            journal.append(entry, [('/a', b'some'), ('/b', b'more')])
+    with closing(sqlite3.connect(tmp_path / JOURNAL)) as database, database:
+        database.execute(change)
+    with pytest.raises(ValueError, match=r'unfinished\.sqlite.* is damaged'):
+        Journal(tmp_path)
+
+
+def test_a_journal_that_is_none_is_named(tmp_path: Path) -> None:
+    (tmp_path / JOURNAL).write_bytes(bytes(range(256)) * 40)
+    with pytest.raises(ValueError, match=r'unfinished\.sqlite is damaged or of another kind'):
+        begun_with(tmp_path)
+    (tmp_path / JOURNAL).unlink()
+    os.mkfifo(tmp_path / JOURNAL)
+    with pytest.raises(ValueError, match=r'unfinished\.sqlite cannot be read: it is a named pipe'):
+        begun_with(tmp_path)

@@ -64,9 +64,9 @@ def test_export_of_results_gives_the_same_files(identified, tmp_path: Path):
 @pytest.mark.parametrize(
     ('rows', 'message'),
     [
-        ('7,1,2\n', "line 1: '7,1,2', accepted is label, x, y, z"),
+        ('7,1,2\n', "has no column id, x, y, z, its columns are '7, 1, 2'"),
         ('7,1,2,3\n9,1,2,inf\n', "line 2: z is 'inf', accepted is a finite number"),
-        ('\n', 'has no points, accepted are rows of label, x, y, z'),
+        ('\n', 'is empty, accepted is a table with id, x, y, z'),
         ('nugget,1,2,3\n', 'no control point is a target of the images: the list has nugget'),
     ],
 )

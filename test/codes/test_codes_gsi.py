@@ -161,7 +161,7 @@ def test_what_is_wrong_with_a_library_is_named(
 
 def test_two_codes_of_one_number_and_broken_files_name_their_line(tmp_path: Path) -> None:
     path = written(tmp_path, '"2": [1, 7, 8]', '"1": [1, 7, 8]')
-    with pytest.raises(ValueError, match=rf'line {line_of(path, "[1, 7, 8]")}: .*duplicate key'):
+    with pytest.raises(ValueError, match=rf'line {line_of(path, "[1, 7, 8]")}: .*is there twice'):
         point_family(str(path))
     path = written(tmp_path, '"E": [11.5, 11.5]', '"E": [11.5, 11.5')
     with pytest.raises(ValueError, match=r'line \d+: .*; accepted is JSON or YAML'):
@@ -172,7 +172,7 @@ def test_two_codes_of_one_number_and_broken_files_name_their_line(tmp_path: Path
     with pytest.raises(ValueError, match=r'nowhere\.json cannot be read'):
         point_family(str(tmp_path / 'nowhere.json'))
     (tmp_path / 'bytes.json').write_bytes(b'\xff\xfe\x00')
-    with pytest.raises(ValueError, match=r'bytes\.json cannot be read'):
+    with pytest.raises(ValueError, match=r'bytes\.json is not a text'):
         point_family(str(tmp_path / 'bytes.json'))
 
 
@@ -184,7 +184,7 @@ def test_files_that_never_end_are_refused(tmp_path: Path) -> None:
         point_family(str(tmp_path / 'bomb.yaml'))
     os.mkfifo(tmp_path / 'queue.yaml')
     for path in (tmp_path / 'queue.yaml', Path('/dev/zero')):
-        with pytest.raises(ValueError, match=rf'{path} cannot be read: it is not a regular file'):
+        with pytest.raises(ValueError, match=rf'{path} cannot be read: it is a'):
             point_family(str(path))
 
 

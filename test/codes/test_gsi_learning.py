@@ -10,7 +10,7 @@ import pytest
 from ahf_ros.cli import main
 from ahf_ros.codes.gsi import point_family, positions_of
 from ahf_ros.codes.gsi_learning import learn_family
-from ahf_ros.interchange.point_lists import read_point_list
+from ahf_ros.interchange.tables import read_points
 from support import ROOT
 from support.photographs import IN_CI
 
@@ -112,10 +112,10 @@ def test_the_command_writes_a_library(tmp_path: Path, capsys: pytest.CaptureFixt
 @pytest.mark.parametrize(
     ('text', 'told'),
     [
-        ('A,1,2\n', r"line 1: 'A,1,2', accepted is label, x, y, z"),
+        ('A,1,2\n', r"has no column id, x, y, z, its columns are 'A, 1, 2'"),
         ('label,x,y,z\nA,1,2,3\nB,1,two,3\n', r"line 3: y is 'two', accepted is a finite number"),
-        ('A,1,2,3\n\nA,1,2,3\n', r"line 3: label is 'A', which line 1 has already"),
-        ('# nothing\n', 'has no points'),
+        ('A,1,2,3\n\nA,1,2,3\n', r"line 3: id is 'A', which line 1 has already"),
+        ('# nothing\n', 'is empty, accepted is a table with id'),
         ('A,1,2,3\n', 'no rows of coded targets'),
     ],
 )
@@ -137,7 +137,7 @@ def test_a_bad_dot_radius_is_refused(capsys: pytest.CaptureFixture) -> None:
 
 @pytest.mark.skipif(not (IN_CI or SURVEY.exists()), reason=f'there is no {SURVEY}')
 def test_the_survey_of_a_telescope_has_the_printed_design() -> None:
-    learnt = learn_family(read_point_list(SURVEY), GSI, 'mine')
+    learnt = learn_family(read_points(SURVEY), GSI, 'mine')
     scale = np.mean([target.scale for target in learnt.targets])
     assert 1 / scale == pytest.approx(1.358, abs=0.002)
     assert np.abs(learnt.family.template * scale - GSI.template).max() < 0.1

@@ -15,7 +15,7 @@ from ahf_ros.evaluation import FALSE, evaluate, judge, score, total
 from ahf_ros.interchange.export.formats import FORMATS, Export
 from ahf_ros.interchange.export.survey import Control, read_measured_images
 from ahf_ros.interchange.image_files import read_image
-from ahf_ros.interchange.point_lists import read_point_list
+from ahf_ros.interchange.tables import read_points
 from ahf_ros.interchange.target_json import read_results
 from ahf_ros.interchange.truth_files import read_truth
 from ahf_ros.target import Truth
@@ -83,7 +83,7 @@ def test_recall_and_wrong_ids_on_the_panel(panel):
 def test_exports_of_the_panel_hold_what_was_measured(panel, name, tmp_path):
     """Control coordinates go along; they are in mm, and a format that has none takes none."""
     images = read_measured_images(panel)
-    control = Control(read_point_list(PANEL / 'points.csv'), 'EPSG:25832', 0.01)
+    control = Control(read_points(PANEL / 'points.csv'), 'EPSG:25832', 0.01)
     Export(name, tmp_path).write(images, control)
     found = READERS[name](tmp_path)
     expected = {

@@ -118,3 +118,13 @@ def test_others_may_write_to_standard_error_meanwhile(capfd):
     writer.join()
     decoded_damage(whole)  # passes on what was being written during the last image
     assert sorted(capfd.readouterr().err.splitlines()) == sorted(lines)
+
+
+def test_chunks_of_png_that_say_they_are_huge_take_no_memory():
+    """Decoders take it, 4 GB, before they look for the content."""
+    content = bytearray(encoded('.png'))
+    place = content.index(b'IDAT') - 4
+    content[place : place + 4] = b'\xff' * 4
+    image, said = decoded(np.frombuffer(content, np.uint8), FLAGS)
+    assert image is None
+    assert said == 'its structure is cut or damaged'

@@ -11,9 +11,11 @@ import numpy as np
 import pytest
 
 from ahf_ros.cli import main
+from ahf_ros.cli.identify import image_paths
+from ahf_ros.imaging.headers import read_header
+from ahf_ros.interchange.exif import read_exif
 from ahf_ros.interchange.image_files import (
     decode_bytes,
-    read_header,
     read_image,
     read_noted_image,
     write_image,
@@ -61,7 +63,7 @@ def test_files_that_are_no_images_are_named(tmp_path):
     (tmp_path / 'text.png').write_text('not an image')
     for name, words in [
         ('missing.png', 'cannot be read: No such file'),
-        ('.', 'cannot be read: Is a directory'),
+        ('.', 'cannot be read: it is a folder'),
         ('empty.png', 'is empty'),
         ('text.png', 'is not an image'),
     ]:
@@ -189,3 +191,117 @@ def test_damaged_headers_are_no_error():
             changed = np.frombuffer(content, np.uint8).copy()
             changed[random.integers(0, len(changed), 5)] = random.integers(0, 256, 5)
             read_header(changed.tobytes())
+
+
+def paged(*directories: list[tuple[int, int, int]], parts: int = 0, order: str = '<') -> bytes:
+    """Return a TIFF whose directories have fields of one integer, and strips of gray values.
+
+    Each field is a tag, a type and a value; each strip has a value of its own. The last `parts`
+    directories belong to the first one, the others follow each other.
+    """
+    content = bytearray(struct.pack(f'{order}2sHL', b'II' if order == '<' else b'MM', 42, 8))
+    pages = len(directories) - parts
+    size = sum(2 + 12 * (len(it) + 3) + 4 for it in directories) + 12
+    strips, places, place = b'', [], 8
+    for number, fields in enumerate(directories):
+        places.append(place)
+        place += 2 + 12 * (len(fields) + 2 + (parts > 0 and number == 0)) + 4
+    for number, fields in enumerate(directories):
+        value = dict((tag, it) for tag, _, it in fields)
+        strip = bytes(range(number, number + 50)) * (value[256] * value[257] // 50)
+        own = [*fields, (273, 4, size + len(strips)), (279, 4, len(strip))]
+        if parts and number == 0:
+            own.append((330, 4, places[pages]))
+        strips += strip
+        content += struct.pack(f'{order}H', len(own))
+        for tag, kind, it in sorted(own):
+            word = struct.pack(f'{order}H2x' if kind == 3 else f'{order}L', it)
+            content += struct.pack(f'{order}HHL', tag, kind, 1) + word
+        content += struct.pack(f'{order}L', places[number + 1] if number + 1 < pages else 0)
+    return bytes(content) + bytes(size - len(content)) + strips
+
+
+def page(width: int, height: int, reduced: int = 0, colours: int = 1, **more: int) -> list:
+    fields = [(254, 4, reduced), (256, 4, width), (257, 4, height), (258, 3, 8), (259, 3, 1)]
+    return [*fields, (262, 3, colours), *((274, 3, it) for it in more.values())]
+
+
+@pytest.mark.parametrize('order', '<>')
+@pytest.mark.parametrize('parts', [0, 1])
+def test_the_image_of_full_size_is_read_wherever_it_is(order, parts):
+    content = paged(page(25, 20, 1), page(50, 40, orientation=6), parts=parts, order=order)
+    noted = decode_bytes(content, 'a.tif')
+    assert noted.image.shape == (40, 50)
+    assert noted.image[0, 0] == 1  # of the second directory
+    assert (noted.orientation, noted.note, noted.damage) == (6, '', '')
+    header = read_header(content)
+    assert (header.width, header.height, header.pages) == (50, 40, 1)
+
+
+def test_the_size_of_a_photograph_is_that_of_its_full_image(tmp_path):
+    pytest.importorskip('PIL')
+    path = tmp_path / 'a.tif'
+    path.write_bytes(paged(page(25, 20, 1), page(50, 40)))
+    assert read_exif(path)[1] == (50, 40)
+
+
+def test_pages_and_raw_images_are_named():
+    noted = decode_bytes(paged(page(50, 40), page(50, 40), page(50, 40)), 'a.tif')
+    assert noted.note == 'a.tif has 3 pages, the first is read'
+    assert noted.image[0, 0] == 0
+    for colours in (32803, 34892):
+        raw = paged(page(25, 20, 1), page(50, 40, 0, colours), parts=1)
+        with pytest.raises(
+            ValueError, match=r'a\.dng is a raw image, accepted is .* in full size'
+        ):
+            decode_bytes(raw, 'a.dng')
+
+
+@pytest.mark.parametrize(
+    ('begin', 'kind'),
+    [
+        (b'\0\0\0\x18ftypheic\0\0\0\0', 'HEIC'),
+        (b'\0\0\0\x0cJXL \r\n', 'JPEG XL'),
+        (b'\0\0\0\x0cjP  \r\n', 'JPEG 2000'),
+        (b'FUJIFILMCCD-RAW 0201', 'a raw image'),
+    ],
+)
+def test_formats_of_cameras_that_are_not_read_are_named(begin, kind):
+    with pytest.raises(ValueError, match=rf'a is {kind}, accepted is .*convert it in full size'):
+        decode_bytes(begin + bytes(100), 'a')
+
+
+@pytest.mark.parametrize('prefix', [b'', b'Exif\0\0'])
+def test_the_orientation_of_webp_is_that_of_its_exif(tmp_path, prefix):
+    _, encoded = cv2.imencode('.webp', DARK)
+    exif = prefix + b'MM\0*\0\0\0\x08\0\1\1\x12\0\3\0\0\0\1\0\6\0\0\0\0\0\0'
+    sides = (DARK.shape[1] - 1).to_bytes(3, 'little') + (DARK.shape[0] - 1).to_bytes(3, 'little')
+    chunks = b'VP8X' + struct.pack('<L', 10) + b'\x08\0\0\0' + sides + encoded.tobytes()[12:]
+    chunks += b'EXIF' + struct.pack('<L', len(exif)) + exif
+    path = tmp_path / 'a.webp'
+    path.write_bytes(b'RIFF' + struct.pack('<L', 4 + len(chunks)) + b'WEBP' + chunks)
+    assert read_noted_image(path).orientation == 6
+    assert read_image(path).shape == DARK.shape
+    assert read_image(path, upright=True).shape == DARK.shape[::-1]
+
+
+def test_missing_pixels_of_floats_are_0(tmp_path):
+    image = 1 + DARK.astype(np.float32)
+    image[3, 4:7] = np.nan, np.inf, -np.inf
+    cv2.imwrite(str(tmp_path / 'a.tif'), image)
+    found = read_image(tmp_path / 'a.tif')
+    assert found[3, 4:7].tolist() == [0, 0, 0]
+    assert (found > 0).sum() == image.size - 3
+    cv2.imwrite(str(tmp_path / 'a.tif'), np.full_like(image, np.nan))
+    assert np.isnan(read_image(tmp_path / 'a.tif')).all()  # for whoever checks images
+
+
+def test_what_is_left_out_of_a_folder_is_counted_by_kind(tmp_path):
+    for name in ('a.png', 'a.HEIC', 'b.heic', 'c.cr2', 'list'):
+        (tmp_path / name).touch()
+    (tmp_path / 'folder').mkdir()
+    paths, problems, left_out = image_paths([str(tmp_path)])
+    assert (paths, problems) == ([str(tmp_path / 'a.png')], [])
+    assert [it.partition(';')[0] for it in left_out] == [
+        f'{tmp_path}: left out are 2 .heic, 1 .cr2, 1 without an ending'
+    ]

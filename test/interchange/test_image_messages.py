@@ -116,7 +116,7 @@ NEUTRAL = np.full((12, 10), 128, np.uint8)
         ('uyvy', np.dstack([NEUTRAL[:6], GRAY])),
         ('yuv422_yuy2', np.dstack([GRAY, NEUTRAL[:6]])),
         ('yuyv', np.dstack([GRAY, NEUTRAL[:6]])),
-        ('nv21', np.concatenate([GRAY, NEUTRAL[:3]])),
+        *((it, np.concatenate([GRAY, NEUTRAL[:3]])) for it in ('nv21', 'nv12', 'i420')),
         ('nv24', np.concatenate([GRAY, NEUTRAL])),
     ],
 )

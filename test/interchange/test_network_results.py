@@ -19,7 +19,8 @@ from ahf_ros.orientation.solution import Solution
 from support.networks import solution
 
 KEYS = {
-    '': 'sigma0 redundancy unit cameras images points covariance_of_points rejected warnings',
+    '': 'sigma0 redundancy unit cameras images points covariance_of_points rejected warnings '
+    'files',
     'cameras': 'name width height fx fy cx cy distortion_model distortion covariance',
     'images': 'image camera rotation position covariance',
     'points': 'id x y z rays',
@@ -109,10 +110,13 @@ def test_the_table_of_points_has_standard_deviations_and_covariances(tmp_path: P
 CHANGES: dict[str, tuple[Callable[[Any], Any], str]] = {
     'no points': (lambda it: it.pop('points'), "has no 'points'.*of this version"),
     'no redundancy': (lambda it: it.pop('redundancy'), "has no 'redundancy'.*of this version"),
-    'NaN': (lambda it: it['points'][1].update(x=float('nan')), 'points 2: x is nan.*finite'),
+    'NaN': (
+        lambda it: it['points'][1].update(x=float('nan')),
+        'points 2: x is nan',
+    ),
     'text': (lambda it: it['points'][1].update(x='1'), "points 2: x is '1'.*a number"),
     'twice': (lambda it: it['points'][1].update(id='1'), "points have '1' twice"),
-    'fewer': (lambda it: it['points'].pop(), 'is of 12 points.*of the 11 points'),
+    'fewer': (lambda it: it['points'].pop(), 'ids has the shape'),
     'shape': (lambda it: it['images'][0].update(rotation=[[1, 0], [0, 1]]), r'\(3, 3\)'),
     'camera': (lambda it: it['images'][0].update(camera='other'), "'other', not in cameras"),
 }
@@ -133,6 +137,9 @@ def test_a_damaged_network_is_named(tmp_path: Path, name: str) -> None:
 
 def test_a_covariance_that_is_none_is_named(tmp_path: Path) -> None:
     write_network(tmp_path, solution())
+    record = json.loads((tmp_path / 'network.json').read_text())
+    del record['files']  # as in earlier versions
+    (tmp_path / 'network.json').write_text(json.dumps(record))
     path = tmp_path / 'covariance_of_points.npz'
     path.write_bytes(b'')
     with pytest.raises(ValueError, match='damaged'):

@@ -20,7 +20,7 @@ import numpy as np
 import pytest
 
 from ahf_ros.interchange.export.formats import network_remark, write_network_export
-from ahf_ros.interchange.point_lists import read_point_list
+from ahf_ros.interchange.tables import read_points
 from ahf_ros.orientation.camera import project
 from ahf_ros.orientation.solution import Solution
 from support import ROOT
@@ -368,7 +368,7 @@ def test_dxf_has_points_and_their_names(tmp_path: Path) -> None:
 def test_vstars_lists_have_the_form_of_its_own(tmp_path: Path, gsi_list: Path | None) -> None:
     write_network_export('vstars', tmp_path, WHOLE)
     path = tmp_path / 'vstars_xyz.csv'
-    found = read_point_list(path)
+    found = read_points(path)
     assert list(found) == [f'CODE{name}' for name in WHOLE.network.targets]
     np.testing.assert_allclose(list(found.values()), WHOLE.start.points, atol=1e-3)
     rows = [line.split(',') for line in path.read_bytes().decode().split('\r\n')[:-1]]

@@ -157,8 +157,8 @@ def result(*targets: str) -> str:
     ('text', 'message'),
     [
         ('{"image": ', 'line 1 is not JSON'),
-        ('[' * 100_000, 'line 1 is not JSON: RecursionError'),
-        (result(f'{{"id": {"9" * 5000}}}'), 'line 1 is not JSON'),
+        ('[' * 100_000, 'line 1 is not JSON: it is nested too deep'),
+        (result(f'{{"id": {"9" * 5000}}}'), 'line 1: target 0: id is inf'),
         ('[]', 'line 1 is not an object with a list of targets'),
         ('{"image": "a", "targets": {}}', 'line 1 is not an object with a list of targets'),
         ('{"targets": []}', 'line 1: image is None, accepted is the name of a file'),

@@ -33,7 +33,7 @@ def test_images_in_a_storage_are_named_read_and_told_apart(tmp_path: Path) -> No
         fsspec.filesystem('memory').pipe(f'/survey/{name}', content)
     names = ['memory://survey/a.PNG', 'memory://survey/b.png']
     for argument in ('memory://survey', 'memory://survey/*.[pP]*'):
-        paths, problems = image_paths([argument])
+        paths, problems, _ = image_paths([argument])
         assert ([path.replace(':///', '://') for path in paths], problems) == (names, [])
     np.testing.assert_array_equal(read_image(names[1]), IMAGE)
     before = file_fingerprint(names[1])

@@ -17,7 +17,7 @@ from ahf_ros.cli.orient import print_network
 from ahf_ros.orientation.network import Rejection
 from ahf_ros.orientation.solution import Solution
 from ahf_ros.report.network_figures import image_figure, sensor_map, views
-from ahf_ros.report.network_page import write_network_page
+from ahf_ros.report.network_page import network_page
 from ahf_ros.report.network_scene import scene
 from support.browser import opened
 from support.networks import SIZE, known, solution
@@ -47,7 +47,7 @@ def figures(text: str) -> list[ElementTree.Element]:
 
 
 def test_the_page_shows_what_was_found(tmp_path: Path) -> None:
-    write_network_page(tmp_path / 'report.html', network(), 'Hall <3>')
+    (tmp_path / 'report.html').write_bytes(network_page(network(), 'Hall <3>'))
     text = (tmp_path / 'report.html').read_text()
     assert '<h1>Hall &lt;3&gt;</h1>' in text and 'a warning &amp; more' in text
     assert 'another target &lt;b&gt;' in text and '7.2' in text
@@ -74,7 +74,7 @@ def test_a_page_of_little_is_a_page(tmp_path: Path) -> None:
     residuals = np.where(used[:, None], whole.residuals, np.nan)
     start = replace(whole.start, positions=positions, points=points, used=used)
     part = replace(whole, start=start, residuals=residuals)
-    write_network_page(tmp_path / 'report.html', part, 'little')
+    (tmp_path / 'report.html').write_bytes(network_page(part, 'little'))
     text = (tmp_path / 'report.html').read_text()
     assert 'no pose' in text and 'has no scale' in text
     assert 'nan' not in text[: text.index('<script')]
@@ -159,7 +159,7 @@ _PLACES = (
 
 
 def test_a_browser_turns_the_network_and_leaves_no_half_of_the_page_empty(tmp_path: Path) -> None:
-    write_network_page(tmp_path / 'report.html', network(), 'Hall')
+    (tmp_path / 'report.html').write_bytes(network_page(network(), 'Hall'))
     with opened() as browser:
         actions = pytest.importorskip('selenium.webdriver').ActionChains
         browser.set_window_size(1300, 1000)

@@ -229,7 +229,7 @@ def test_no_page_is_left_in_part(
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     with monkeypatch.context() as patch:
-        patch.setattr('ahf_ros.interchange.files.os.fsync', full)
+        patch.setattr('ahf_ros.writing.os.fsync', full)
         assert report(results, '-o', page) == 1
     assert 'report.html cannot be written: No space left on device' in capsys.readouterr().err
     assert [it.name for it in page.parent.iterdir()] == ['report.html']

@@ -12,7 +12,7 @@ from pathlib import Path, PurePath
 from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Literal
 
-from ahf_ros.interchange.files import write_whole
+from ahf_ros.writing import write_files
 
 if TYPE_CHECKING:
     from ahf_ros.interchange.export.survey import Control, MeasuredImage
@@ -137,7 +137,7 @@ class Export:
     def write(
         self, images: Sequence[MeasuredImage], control: Control | None = None
     ) -> tuple[Path, ...]:
-        """Write the files of the export, each as a whole, and return their paths.
+        """Write the files of the export, all or none, and return their paths.
 
         A ValueError says what the format cannot hold, or which file cannot be written.
         """
@@ -146,11 +146,11 @@ class Export:
         self.check_names(image.path for image in images)
         kind = FORMATS[self.format]
         survey = make_survey(images, control if kind.control else None, kind.origin)
-        return _written(self.folder, resolve_name(f'ahf_ros.{kind.writer}')(survey))
+        return write_files(self.folder, resolve_name(f'ahf_ros.{kind.writer}')(survey).items())
 
 
 def write_network_export(format_name: str, folder: Path, solution: Solution) -> tuple[Path, ...]:
-    """Write a network for other software, each file as a whole, and return the paths.
+    """Write a network for other software, all files or none, and return the paths.
 
     A ValueError says what the format cannot hold, or which file cannot be written.
     """
@@ -165,7 +165,7 @@ def write_network_export(format_name: str, folder: Path, solution: Solution) -> 
             f'{format_name} knows images by their names, accepted are different names in all '
             'folders'
         )
-    return _written(folder, resolve_name(f'ahf_ros.{kind.writer}')(solution))
+    return write_files(folder, resolve_name(f'ahf_ros.{kind.writer}')(solution).items())
 
 
 def _check_lenses(format_name: str, solution: Solution) -> None:
@@ -188,10 +188,3 @@ def network_remark(format_name: str, solution: Solution) -> str:
     if loss < _NOTABLE:
         return ''
     return f'{format_name} has no {lacks}: its image points differ by up to {loss:.2f} px'
-
-
-def _written(folder: Path, files: Mapping[str, bytes]) -> tuple[Path, ...]:
-    """Write files to a folder, each as a whole, and return their paths."""
-    for name, content in files.items():
-        write_whole(folder / name, content)
-    return tuple(folder / name for name in files)

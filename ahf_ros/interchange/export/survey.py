@@ -13,6 +13,7 @@ import numpy as np
 
 from ahf_ros.interchange.files import checked_file_name
 from ahf_ros.interchange.target_json import json_lines, targets_from_json
+from ahf_ros.opening import reader
 from ahf_ros.target import UNDECODED, Target
 from ahf_ros.target_check import checked_integer
 from ahf_ros.text import listed, shown
@@ -44,6 +45,7 @@ class MeasuredImage:
         return PurePath(self.path).name
 
 
+@reader('results of ahf identify --json')
 def read_measured_images(path: str | Path) -> tuple[MeasuredImage, ...]:
     """Return what was identified, from the output of `ahf identify --json`, see `json_lines`.
 
