@@ -80,18 +80,18 @@ def failed_checks(solution: Solution, left_out: Sequence[Suspect] = ()) -> tuple
     """Return the checks that fail, but for suspects that were left out."""
     named = {it.name for it in left_out}
     found = []
-    for bar in bar_deviations(solution):
+    # A bar between two exact points says nothing of the network.
+    for bar in (it for it in bar_deviations(solution) if it.bar.check and it.sigma > 0):
         statistic, gap = (bar.deviation / bar.sigma) ** 2, abs(bar.deviation)
-        found.append((bar.bar.check, bar.bar.title, 1, statistic, gap))
-    for it in control_deviations(solution):
+        found.append((bar.bar.title, 1, statistic, gap))
+    for it in (it for it in control_deviations(solution) if it.point.check):
         statistic = float(it.deviation @ np.linalg.pinv(it.covariance) @ it.deviation)
         gap = float(np.linalg.norm(it.deviation))
-        found.append((it.point.check, it.point.title, 3, statistic, gap))
+        found.append((it.point.title, 3, statistic, gap))
     return tuple(
         Suspect(name, gap, gap / math.sqrt(statistic), probability, 'failed')
-        for check, name, freedom, statistic, gap in found
-        if check
-        and name not in named
+        for name, freedom, statistic, gap in found
+        if name not in named
         and (probability := float(special().chdtrc(freedom, statistic))) < _FAILED
     )
 

@@ -171,7 +171,7 @@ def test_a_design_of_ones_own_is_printed_and_identified(
 @pytest.mark.parametrize(
     ('name', 'text', 'message'),
     [
-        ('gsi', SIX.replace('  left: [-14, -6, 3]\n', ''), 'line 7: template .*3 to 12 names'),
+        ('gsi', SIX.replace('  left: [-14, -6, 3]\n', ''), 'line 6: template .*3 to 12 names'),
         ('gsi_published', SIX, "the family is 'six', accepted by gsi_published is one"),
         ('dots', TWO, r'own\.yaml, line 4: bits is 2'),
         ('dots_published', TWO, r'own\.yaml, line 4: bits is 2'),

@@ -435,6 +435,8 @@ def _as_ink(
     what lies behind the plate.
     """
     gap, beyond = np.flatnonzero(sides[0]), np.flatnonzero(sides[1])[:1]
+    if not gap.size:  # further circles fill it
+        return np.zeros_like(level)
     near = np.append(gap, beyond)
     ground, width = (of[..., near].reshape(len(of), -1) for of in (level, noise))
     apart = np.abs(ground - medians(ground)[:, None])
