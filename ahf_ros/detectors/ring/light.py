@@ -28,7 +28,6 @@ _SHADOW = 0.1  # share of a gap that is as dark as ink in shadow
 _ALIKE = 1.1  # ratio of differences of shifts that are as good as each other
 _UNKNOWN = 0.03  # weight of ground below which less than two of the shifts predict a point
 _ROUNDING = 1e-5  # square of ln by which whole gray values near 90 differ, without any noise
-
 _NO_MATCH = 1e6  # square of differences of shifts that compare too little
 _PART = 32  # targets at a time, whose transforms stay in the cache
 
@@ -52,7 +51,7 @@ def predicted_light(
     the ground over its `contrast`, shape (k,). The second array is the standard deviation of the
     logarithm of the first, infinite where no ground predicts it; both are float32, (k, m, d).
     """
-    points, ground, candidates, order = _geometry(band, circles)
+    points, ground, candidates, order, compared = _geometry(band, circles)
     place = _places(band[1] + _MARGIN, angles, radii)
     shape = len(frames), len(angles), len(radii)
     light, spread = np.empty(shape, np.float32), np.empty(shape, np.float32)
@@ -60,12 +59,10 @@ def predicted_light(
         part = slice(start, start + _PART)
         values = np.maximum(sample(gray, frame.project(frames[part], points)), 0)
         values = lifted(values, lift[part].astype(np.float32)[:, None, None])
-        grounds = ground[None]
+        grounds, (seen, overlap, few) = ground[None], compared
         if plate is not None and contrast is not None and np.isfinite(plate[part]).any():
             values, grounds = _as_dark(values, ground, points, band, plate[part], contrast[part])
-        seen = np.fft.rfft2(grounds, (_TRANSFORM,) * 2)
-        overlap = np.fft.irfft2(np.abs(seen) ** 2, (_TRANSFORM,) * 2)
-        overlap = overlap.reshape(len(grounds), -1)[:, candidates]
+            seen, overlap, few = _compared(grounds, candidates)
         logs = np.log(values + np.float32(LOG_OFFSET))
         whole = grounds.sum(axis=(1, 2), keepdims=True)
         middle = (logs * grounds).sum(axis=(1, 2), keepdims=True) / whole
@@ -76,7 +73,7 @@ def predicted_light(
         differ = np.fft.irfft2(both, (_TRANSFORM,) * 2)
         differ = (differ + _turned(differ)).reshape(len(logs), -1)[:, candidates] / 2
         differ = np.maximum(differ / np.maximum(overlap, 1), _ROUNDING) * order
-        differ[np.broadcast_to(overlap <= _OVERLAP * whole[:, 0], differ.shape)] = _NO_MATCH
+        differ = np.where(few, _NO_MATCH, differ)
         best = np.argpartition(differ, _SHIFTS, axis=1)[:, :_SHIFTS]
         of_best = np.take_along_axis(differ, best, axis=1)
         weight = 1 / (of_best + of_best.min(axis=1, keepdims=True) / 2)
@@ -94,6 +91,19 @@ def predicted_light(
         light[part] = np.exp(mean + middle) - LOG_OFFSET
         spread[part] = np.where(known > _UNKNOWN, np.sqrt(variance + error), np.inf)
     return np.maximum(light, 0), spread
+
+
+def _compared(
+    grounds: np.ndarray, shifts: np.ndarray | slice
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the transforms of grounds (k, n, n), and what some shifts of them compare.
+
+    That is how many cells, and whether these are too few, (k, shifts).
+    """
+    seen = np.fft.rfft2(grounds, (_TRANSFORM,) * 2)
+    overlap = np.fft.irfft2(np.abs(seen) ** 2, (_TRANSFORM,) * 2)
+    overlap = overlap.reshape(len(grounds), -1)[:, shifts]
+    return seen, overlap, overlap <= _OVERLAP * grounds.sum(axis=(1, 2))[:, None]
 
 
 def _as_dark(
@@ -123,10 +133,11 @@ def _as_dark(
 @lru_cache(maxsize=16)
 def _geometry(
     band: Radii, circles: tuple[Radii, ...]
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, tuple[np.ndarray, ...]]:
     """Return the cells of a rectified target, its ground, the shifts compared, and their order.
 
-    Factors near one put shifts that are alike into any order, so that they reach all places.
+    Factors near one put shifts that are alike into any order, so that they reach all places. The
+    last is what these shifts compare, see `_compared`.
     """
     inner, outer = band
     reach = outer + _MARGIN
@@ -136,13 +147,13 @@ def _geometry(
     ground = ((radii > 1 + _ASIDE) & (radii < inner - _ASIDE)) | (radii > outer + _ASIDE)
     ground &= clear_of(radii, circles, _ASIDE)
     whole = ground.astype(np.float32)
-    seen = np.fft.rfft2(whole, (_TRANSFORM,) * 2)
-    overlap = np.fft.irfft2(np.abs(seen) ** 2, (_TRANSFORM,) * 2)
+    seen, overlap, few = _compared(whole[None], slice(None))
     steps = np.fft.fftfreq(_TRANSFORM, 1 / _TRANSFORM) * (2 * reach / _CELLS)
     away = np.hypot(steps[:, None], steps)
-    candidates = (overlap > _OVERLAP * whole.sum()) & (away > 0) & (away <= _MAXIMUM_SHIFT)
-    which = np.flatnonzero(candidates)
-    return points, whole, which, np.random.default_rng(0).uniform(1, _ALIKE, len(which))
+    near = (away > 0) & (away <= _MAXIMUM_SHIFT)
+    which = np.flatnonzero(~few[0] & near.ravel())
+    order = np.random.default_rng(0).uniform(1, _ALIKE, len(which))
+    return points, whole, which, order, (seen, overlap[:, which], few[:, which])
 
 
 def clear_of(radii: np.ndarray, circles: tuple[Radii, ...], aside: float = 0.1) -> np.ndarray:
