@@ -36,8 +36,8 @@ def with_ends(polar: PolarImages, words: Words, overhang: np.ndarray, family: Fa
     word that no family has competes with words that need a cover.
     """
     inner, outer = family.band
-    radii = inner + (outer - inner) * np.tile(DEPTHS, (len(overhang), 1)).T
-    levels = np.mean([polar.at(of) for of in radii], axis=0)
+    radii = inner + (outer - inner) * np.tile(DEPTHS, (len(overhang), 1))
+    levels = polar.at(radii).mean(axis=1)
     odds, beside, unseen = _ends(polar, levels, words, overhang, family)
     other, _, unseen_of_other = _ends(polar, levels, words.as_they_look(), overhang, family)
     ahead = words.ahead + other - odds - _UNSEEN * (unseen_of_other - unseen)

@@ -47,12 +47,14 @@ def predicted_light(
 
     The points are at angles (m,), rad, and radii (d,) of targets with frames (k, 3, 3), in which
     black is lifted to gray values (k,); `circles` are no ground. Where dark ground ends on white
-    paper, at the radii of a `plate`, shape (k, 2), see `PolarImages`, that paper is as bright as
-    the ground over its `contrast`, shape (k,). The second array is the standard deviation of the
-    logarithm of the first, infinite where no ground predicts it; both are float32, (k, m, d).
+    paper, between the radii of a `plate`, shape (k, 2, m), see `PolarImages.rim`, that paper is as
+    bright as the ground over its `contrast`, shape (k,). The second array is the standard
+    deviation of the logarithm of the first, infinite where no ground predicts it; both are
+    float32, (k, m, d).
     """
     points, ground, candidates, order, compared = _geometry(band, circles)
     place = _places(band[1] + _MARGIN, angles, radii)
+    toward = _nearest(angles, points)
     shape = len(frames), len(angles), len(radii)
     light, spread = np.empty(shape, np.float32), np.empty(shape, np.float32)
     for start in range(0, len(frames), _PART):
@@ -61,7 +63,9 @@ def predicted_light(
         values = lifted(values, lift[part].astype(np.float32)[:, None, None])
         grounds, (seen, overlap, few) = ground[None], compared
         if plate is not None and contrast is not None and np.isfinite(plate[part]).any():
-            values, grounds = _as_dark(values, ground, points, band, plate[part], contrast[part])
+            values, grounds = _as_dark(
+                values, ground, points, band, plate[part][..., toward], contrast[part]
+            )
             seen, overlap, few = _compared(grounds, candidates)
         logs = np.log(values + np.float32(LOG_OFFSET))
         whole = grounds.sum(axis=(1, 2), keepdims=True)
@@ -121,13 +125,20 @@ def _as_dark(
     """
     inner, outer = band
     radii = np.hypot(*np.moveaxis(points, 2, 0))
-    ends, begins = np.moveaxis(plate, 1, 0)[..., None, None]
+    ends, begins = np.moveaxis(plate, 1, 0)
     step = contrast.astype(np.float32)[:, None, None]
     on_paper = (radii > begins) & (radii < outer + _MARGIN)
     gap = np.sort(values[:, (ground > 0) & (radii < inner)], axis=1)
     shadow = gap[:, int(_SHADOW * gap.shape[1])][:, None, None]
     paper = on_paper & (values * np.sqrt(step) > shadow)
     return np.where(on_paper, values * step, values), ground * ((radii < ends) | paper)
+
+
+def _nearest(angles: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Return which of even angles (m,) are the nearest to those of points (..., 2), rad."""
+    x, y = np.moveaxis(points, -1, 0)
+    steps = np.rint((np.arctan2(y, x) - angles[0]) / (angles[1] - angles[0]))
+    return np.asarray(steps.astype(np.intp) % len(angles))
 
 
 @lru_cache(maxsize=16)

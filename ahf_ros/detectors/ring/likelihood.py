@@ -161,20 +161,30 @@ def edge_evidence(
     beside = np.clip(beside / polar.size, _MINIMUM_BESIDE, _MAXIMUM_BESIDE)
     before = np.minimum(beside, 0.5 * (inner - radius - growth))
     within = np.minimum(beside, 0.45 * (outer - inner))
+    beyond, rim = beside[:, None], polar.plate - outer[:, None]
+    on_plate = np.isfinite(rim).any()
+    if on_plate:
+        beyond = np.minimum(beyond, 0.5 * rim)
     edges = light_edges(polar, radius, growth, inner)
-    ground_at = np.stack([inner - before, outer + beside])
-    band_at = np.stack([inner + within, outer - within])
-    ground, inside = (polar.at(of).swapaxes(0, 1) for of in (ground_at, band_at))
-    # Shares of ink on ground and band, without marks and with them.
-    bare = [_blurred(polar, at, -np.inf, radius + growth) for at in (ground_at, band_at)]
-    marked = [
-        of_dot + _blurred(polar, at, inner, outer)
-        for of_dot, at in zip(bare, (ground_at, band_at), strict=True)
-    ]
+    gap = np.broadcast_to((inner - before)[:, None], beyond.shape)
+    ground_at = np.stack([gap, outer[:, None] + beyond], axis=1)
+    band_at = np.stack([inner + within, outer - within], axis=1)
+    ground = polar.at(ground_at if on_plate else ground_at[..., 0])
+    inside = polar.at(band_at)
+    # Shares of ink on ground and band, without marks and with them. White paper is as white ink.
+    bare, marked = [], []
+    for at in (ground_at, band_at[..., None]):
+        of_rest = _blurred(polar, at, -np.inf, (radius + growth)[:, None])
+        if on_plate:
+            of_rest = of_rest + _blurred(polar, at, polar.plate, np.inf)
+        bare.append(of_rest)
+        marked.append(of_rest + _blurred(polar, at, inner[:, None], outer[:, None]))
     paper, ink, *between = _step_evidence(polar, inside, ground, edges, bare, marked, shares)
     between, typical = between[: len(shares)], between[len(shares) :]
     weight = weights(polar)
-    visible = polar.reach[:, None] >= np.stack([inner + within, outer + beside], axis=1)[..., None]
+    ends = np.broadcast_to((inner + within)[:, None], beyond.shape)
+    visible = polar.reach[:, None] >= np.stack([ends, outer[:, None] + beyond], axis=1)
+    visible[:, 1] &= rim > 0
     share = weight[:, None, None] * visible
     covered = np.zeros(visible.shape, bool)
     if shares:
@@ -194,12 +204,20 @@ def edge_evidence(
 
 
 def _blurred(
-    polar: PolarImages, at: np.ndarray, inner: np.ndarray | float, outer: np.ndarray
+    polar: PolarImages,
+    at: np.ndarray,
+    inner: np.ndarray | float,
+    outer: np.ndarray | float,
 ) -> np.ndarray:
-    """Return the shares of ink that blur leaves or brings at radii (n, k) of a ring, (k, n, 1)."""
-    deviation = polar.blur / polar.size
-    below, above = (normal_integral((of - at) / deviation) for of in (inner, outer))
-    return np.asarray(above - below).T[..., None].astype(np.float32)
+    """Return the shares of ink that blur leaves or brings at radii (k, r, m) of a ring.
+
+    The radii of the ring are (k, m), too, or (k, 1).
+    """
+    deviation = (polar.blur / polar.size)[:, None, None]
+    below, above = (
+        normal_integral((np.atleast_2d(of)[:, None] - at) / deviation) for of in (inner, outer)
+    )
+    return np.asarray(above - below).astype(np.float32)
 
 
 def _blur_along(polar: PolarImages, band: tuple[float, float]) -> np.ndarray:
@@ -244,7 +262,7 @@ def light_edges(
 ) -> np.ndarray:
     """Return the probabilities of an edge of light between neighbours, as gaps show it, (k,)."""
     start, width = radius + growth, inner - radius - growth
-    across = polar.at(start + np.multiply.outer(_ACROSS, width)).swapaxes(0, 1)
+    across = polar.at(start[:, None] + np.multiply.outer(width, _ACROSS))
     level, noise = polar.logs(across)
     step = np.abs(level[:, 0] - level[:, 1])
     many = (step**2 > LIGHT_EDGE**2 + 4 * (noise**2).sum(axis=1)).mean(axis=1)
@@ -344,8 +362,8 @@ def level_evidence(
     known = np.isfinite(spread)
     inner, outer = band
     in_dot, in_band = radii < 1, (radii > inner) & (radii < outer)
-    at, edges = np.tile(radii, (len(growth), 1)).T, band_edges(np.ones(len(growth)), growth, band)
-    share = np.where(in_dot, 1, _blurred(polar, at, *edges)[..., 0])[:, None]
+    edges = (of[:, None] for of in band_edges(np.ones(len(growth)), growth, band))
+    share = np.where(in_dot, 1, _blurred(polar, radii[None, :, None], *edges)[..., 0])[:, None]
     spread, inked = np.where(known, spread, 1), polar.printed(light, share, levels)
     of_paper = np.sqrt(_PAPER_LEVEL**2 + noise**2 + spread**2)
     of_ink = np.sqrt(_INK_LEVEL**2 + noise**2 + (spread * _gain(light, inked)) ** 2)
@@ -360,7 +378,8 @@ def level_evidence(
     depth = np.minimum(_DEPTH * polar.size / CORRELATION, 1)
     weight = (weights(polar) * depth).astype(np.float32)
     limit = polar.glare[:, None, None]
-    seen = known & polar.tells(levels) & (radii <= polar.reach[..., None])
+    reach = np.minimum(polar.reach, polar.rim(outer)[:, 0])
+    seen = known & polar.tells(levels) & (radii <= reach[..., None])
     on_ground = ~in_dot & ~in_band
     middle = (inner + outer) / 2
     halves = (radii > 1) & (radii < middle), radii > middle

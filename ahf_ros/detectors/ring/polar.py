@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -53,6 +54,8 @@ _LIGHT = 0.34  # share of the ground that is darker, or has edges, from which th
 _GLARE_EDGES = 0.03  # share of the ground, more than edges of glare have
 _WHITE_OUT = 0.6  # share of the ground that is saturated, from which that is no glare
 _ASIDE = 0.15  # least distance from the band at which its ground may end, dot radii
+_TURN = 15  # between squares that are tried, degrees
+_SQUARE = 0.7  # weight of a square, which has an angle that suits stripes, where a disc has 1
 _WHITE = 0.5  # share of the step of ink, in ln, from which what ends the ground is white
 _NO_GLARE = 256.0  # more than any gray value
 
@@ -83,9 +86,9 @@ class PolarImages(ArrayRecord):
         Of edges, standard deviation in px.
     noise : ndarray of float64, shape (k,)
         Of gray values.
-    plate : ndarray of float64, shape (k, 2)
-        Radii up to which ground is as dark as the gap, and from which on it is white paper, dot
-        radii; infinite where no paper is seen.
+    plate : ndarray of float64, shape (k, m)
+        Radius at which dark ground ends on white paper at an angle, dot radii; infinite where it
+        does not.
     shade, glare : ndarray of float32, shape (k,)
         Gray values of ground up to which something covers it, and from which glare lies on it;
         infinite where white is paper.
@@ -119,13 +122,30 @@ class PolarImages(ArrayRecord):
         """Return all dots several times, one time after the other."""
         return self.select(np.tile(np.arange(len(self.row)), times))
 
+    def rim(self, outer: float) -> np.ndarray:
+        """Return up to which radii a plate is dark, and from which paper is white, (k, 2, m).
+
+        Between them blur mixes both. At the `outer` radius of the band nothing of it is white.
+        """
+        aside = (SOFT_EDGE * self.blur / self.size)[:, None]
+        inside = np.maximum(self.plate - aside, outer)
+        return np.stack([inside, self.plate + aside / 2], axis=1)
+
     def at(self, radii: np.ndarray) -> np.ndarray:
-        """Return gray values on circles of dots, of radii (..., k) in dot radii, (..., k, m)."""
+        """Return gray values at radii (k, r), or at other ones at each angle, (k, r, m).
+
+        The radii are in dot radii; the gray values have shape (k, r, m).
+        """
         spacing = (self.outermost - _INNERMOST) / (self.gray.shape[2] - 1)
-        place = np.clip((radii - _INNERMOST) / spacing, 0, self.gray.shape[2] - 1.001)
+        place = (radii - _INNERMOST) / _along(spacing, radii)
+        place = np.clip(place, 0, self.gray.shape[2] - 1.001)
         below = place.astype(np.intp)
-        share = (place - below).astype(np.float32)[..., None]
-        values, beyond = (self.gray[self.row, :, circle] for circle in (below, below + 1))
+        share = (place - below).astype(np.float32)
+        if radii.ndim == 2:
+            share, of = share[..., None], (self.row[:, None], slice(None))
+        else:
+            of = self.row[:, None, None], np.arange(radii.shape[2])
+        values, beyond = (self.gray[(*of, circle)] for circle in (below, below + 1))
         values *= 1 - share
         beyond *= share
         values += beyond
@@ -209,7 +229,7 @@ def polar_images(
         size=dots.size,
         blur=dots.blur,
         noise=noise,
-        plate=np.full((len(values), 2), np.inf),
+        plate=np.full((len(values), count), np.inf),
         shade=shade,
         glare=glare,
     )
@@ -313,34 +333,52 @@ def _reach(
 def on_dark_ground(
     polar: PolarImages, band: tuple[float, float], which: np.ndarray | bool = True
 ) -> PolarImages:
-    """Return polar images in which some bright targets reach as far as the dark ground about them.
+    """Return polar images that say where the dark ground about some bright targets ends.
 
-    Where most directions beyond the band are brighter than the gap, by as much as ink is, the
-    ground ends: it was a disc or a square that is little larger than the band, on white paper.
-    Light may change between two places, but not in most directions to the same side.
+    What is brighter than the gap by as much as ink is, in most directions, is white paper: the
+    ground was a disc or a square, turned anyhow, that is little larger than the band. Light may
+    change between two places, but not in most directions to the same side.
     """
     inner, outer = band
     bright = np.flatnonzero((polar.polarity < 0) & which)
     if not bright.size:
         return polar
     some = polar.select(bright)
-    gap = some.at(np.tile(1 + (inner - 1) * GAP, (len(bright), 1)).T).mean(axis=0)
+    gap = some.at(np.tile(1 + (inner - 1) * GAP, (len(bright), 1))).mean(axis=1)
+    aside = np.maximum(SOFT_EDGE * some.blur / some.size, _ASIDE)
     steps = some.levels(some.gray[some.row]) - some.levels(gap)[..., None]
-    steps = steps.swapaxes(1, 2)
-    usual = medians(steps.reshape(-1, steps.shape[2])).reshape(steps.shape[:2])
-    aside = SOFT_EDGE * some.blur / some.size
-    dark = usual <= -_WHITE * np.log(some.contrast)[:, None]
-    dark |= some.radii < (outer + np.maximum(aside, _ASIDE))[:, None]
-    ends = np.flatnonzero(~dark[:, -1])
-    if not ends.size:
+    votes = np.sign(steps + _WHITE * np.log(some.contrast)[:, None, None])
+    votes *= (some.radii >= (outer + aside)[:, None])[:, None]
+    beyond = votes[..., ::-1].cumsum(axis=2)
+    ended = np.flatnonzero(beyond[..., 0].sum(axis=1) > 0)
+    if not ended.size:
         return polar
-    bright, aside, radii = bright[ends], aside[ends], some.radii[ends]
-    first = radii.shape[1] - dark[ends, ::-1].argmax(axis=1)
-    end = radii[np.arange(len(ends)), first]
-    plate, reach = polar.plate.copy(), polar.reach.copy()
-    plate[bright] = np.stack([np.maximum(end - aside, outer), end + aside / 2], axis=1)
-    reach[bright] = np.minimum(reach[bright], plate[bright, :1])
-    return replace(polar, plate=plate, reach=reach)
+    ends, place, weight = _outlines(*votes.shape[1:], outer)
+    beyond = np.pad(beyond[ended], ((0, 0), (0, 0), (0, 1)))
+    score = beyond[:, np.arange(votes.shape[1]), place].sum(axis=2) * weight
+    plate = polar.plate.copy()
+    plate[bright[ended]] = ends[score.argmax(axis=1)]
+    return replace(polar, plate=plate)
+
+
+@lru_cache(maxsize=16)
+def _outlines(
+    count: int, circles: int, outer: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return radii of discs and squares at some angles, (shapes, m), largest first.
+
+    Then comes how many circles lie beyond, less one, -1 where none does, and what votes for a
+    shape weigh.
+    """
+    radii = np.linspace(_INNERMOST, outer + _MARGIN, circles)
+    sizes = radii[radii > outer][::-1]
+    turns = np.append(np.arange(0, 90, _TURN), np.nan)
+    across = np.deg2rad((np.rad2deg(angles_of(count)) - turns[:, None] + 45) % 90 - 45)
+    ends = sizes[:, None, None] / np.nan_to_num(np.cos(across), nan=1.0)
+    ends = ends.reshape(-1, count)
+    beyond = circles - np.searchsorted(radii, ends - 1e-9)
+    weight = np.tile(np.where(np.isnan(turns), 1, _SQUARE), len(sizes))
+    return np.where(beyond > 0, ends, np.inf), beyond - 1, weight
 
 
 def _along(of_targets: np.ndarray, values: np.ndarray) -> np.ndarray:

@@ -215,8 +215,8 @@ def _holes(polar: PolarImages, outer: np.ndarray) -> np.ndarray:
         return holes
     polar, outer = polar.select(bright), outer[bright]
     inside, outside = (
-        polar.levels(polar.at(radius).swapaxes(0, 1))
-        for radius in (DOT[:, None] * np.ones_like(outer), outer + MARGIN[:, None])
+        polar.levels(polar.at(radii))
+        for radii in (np.tile(DOT, (len(outer), 1)), outer[:, None] + MARGIN)
     )
     usual = medians(inside.reshape(len(outer), -1))[:, None, None]
     alike = np.abs(outside - usual) < _ALIKE

@@ -107,8 +107,8 @@ def _read_part(
     printed = np.abs(fit.proportion - 1) < _PROPORTION
     bands = replace(fit, frames=frame.scaled(fit.frames, np.where(printed, fit.proportion, 1)))
     growth = fit.polarity * fit.edge_shift / bands.size
-    whole = polar_images(gray, bands, family.band, family.bits * PER_SECTOR)
-    polar = on_dark_ground(whole, family.band, fit.share >= ENOUGH)
+    polar = polar_images(gray, bands, family.band, family.bits * PER_SECTOR)
+    polar = on_dark_ground(polar, family.band, fit.share >= ENOUGH)
     edges = edge_evidence(polar, np.ones(len(read)), growth, family.band, SHARES)
     words = decode(edges, _overhang(growth, family), family, prior.expected)
     # What is seen against anything is that of edges alone, whatever else there is.
@@ -119,12 +119,11 @@ def _read_part(
     if asked.size < read.size:
         read, growth = read[asked], growth[asked]
         fit, bands = fit.select(asked), bands.select(asked)
-        polar, whole = polar.select(asked), whole.select(asked)
-        edges, words = edges.select(asked), words.select(asked)
+        polar, edges, words = polar.select(asked), edges.select(asked), words.select(asked)
     overhang = _overhang(growth, family)
     words = _settled(gray, bands, polar, edges, words, growth, family, prior.expected, last=True)
     words = with_ends(polar, words, overhang, family)
-    words = replace(words, unlike=unlike_print(whole, words, growth, overhang, family))
+    words = replace(words, unlike=unlike_print(polar, words, growth, overhang, family))
     good = _mean_odds(words, edges.weight) > hopeful
     if not good.any():
         return unread
@@ -141,7 +140,8 @@ def best_growth(
 
     In the dot radii of the image; a dot that is seen with radius 1 was printed with less.
     """
-    half = replace(polar, gray=polar.gray[:, ::2], reach=polar.reach[:, ::2])
+    gray, reach, plate = polar.gray[:, ::2], polar.reach[:, ::2], polar.plate[:, ::2]
+    half = replace(polar, gray=gray, reach=reach, plate=plate)
     every = half.repeated(len(_SHIFTS))
     tried = growth_by(np.repeat(_SHIFTS, len(polar.size)), every.size)
     edges = edge_evidence(every, 1 - tried, tried, band)
@@ -189,7 +189,7 @@ def _settled(
     levels = np.maximum(sample_circles(gray, targets.frames, angles, radii), 0)
     levels = lifted(levels, polar.lift.astype(np.float32)[:, None, None])
     of_target = targets.frames, polar.lift, angles, radii
-    of_print = family.band, family.circles, polar.plate, polar.contrast
+    of_print = family.band, family.circles, polar.rim(outer), polar.contrast
     light, spread = predicted_light(gray, *of_target, *of_print)
     growth = growth[some]
     of_levels = level_evidence(polar, levels, light, spread, radii, growth, family.band, SHARES)
