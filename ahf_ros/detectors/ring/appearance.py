@@ -13,8 +13,8 @@ import numpy as np
 from ahf_ros.codes.ring import Family
 from ahf_ros.detectors.ring.decoding import Words, bits_at, lengthened
 from ahf_ros.detectors.ring.light import clear_of
-from ahf_ros.detectors.ring.polar import SOFT_EDGE, PolarImages
-from ahf_ros.features.robust import median
+from ahf_ros.detectors.ring.polar import LIGHT_EDGE, SOFT_EDGE, PolarImages, angles_of
+from ahf_ros.features.robust import fit_linear
 from ahf_ros.imaging.logarithm import LOG_OFFSET
 
 _MINIMUM_ASIDE = 1.0  # distance from an edge at which it ends, px
@@ -23,6 +23,7 @@ _BEYOND = 0.2, 0.7  # the ground beyond a band, dot radii
 _ASIDE = 0.25  # distance from further circles, dot radii
 _EVEN, _UNEVEN = 0.3, 0.03  # of the step of ink that even paper keeps within; share that may not
 _UNLIKE = 0.5  # of that step, up to which ink is paper
+_DEEPER = 2.0  # steps of ink, up to which a dot is darker than its soft edge
 _READINGS = 2  # in one direction, which are no noise
 _OF_MARKS = 1 / 3  # of all sectors, that are as unlike as all marks
 
@@ -60,7 +61,7 @@ def unlike_print(
     uneven = (np.abs(step) > _EVEN) & ground
     even = uneven.sum(axis=(1, 2)) < _UNEVEN * ground.sum(axis=(1, 2))
     of_dot = step[..., (radii < _INMOST).all(axis=0)].mean(axis=(1, 2))
-    even &= np.abs(of_dot - 1) < _EVEN
+    even &= (of_dot > 1 - _EVEN) & (of_dot < _DEEPER)
     faded, stray = ink & (step < _UNLIKE), paper & (step > _EVEN)
     lost = np.count_nonzero(faded, axis=2) >= _READINGS
     printed = np.maximum(np.count_nonzero(ink.any(axis=2), axis=1), 1)
@@ -79,16 +80,21 @@ def unlike_print(
 
 
 def _step_shares(polar: PolarImages, ground: np.ndarray) -> np.ndarray:
-    """Return steps of ln from the usual gray value of ground, in those of ink, (k, m, n)."""
-    gray = polar.gray[polar.row]
+    """Return steps of ln from the light that ground shows, in those of ink, (k, m, n).
+
+    That light is a plane in ln, as a lamp nearby makes it.
+    """
+    values = np.log(polar.gray[polar.row] + np.float32(LOG_OFFSET))
+    angles, radii = angles_of(ground.shape[1])[:, None], polar.radii[0]
+    plane = np.stack([np.ones(ground.shape[1:]), *(radii * of(angles) for of in (np.cos, np.sin))])
     beyond = np.asarray(ground.any(axis=(0, 1)))
     beyond[-1] = True  # blur may leave none
-    flat = len(ground), ground.shape[1] * int(beyond.sum())
-    levels, known = (of[..., beyond].reshape(flat) for of in (gray, ground))
-    paper = median(levels, known)[:, None]
-    ink = polar.inked(paper, paper)
-    of_paper, of_ink = (np.log(of + LOG_OFFSET)[..., None] for of in (paper, ink))
-    values = np.log(gray + np.float32(LOG_OFFSET))
-    step = np.where(of_ink == of_paper, np.inf, of_ink - of_paper)
-    shares: np.ndarray = (values - of_paper) / step
+    seen, known, basis = (
+        of[..., beyond].reshape(len(of), -1).astype(float) for of in (values, ground, plane)
+    )
+    light, _ = fit_linear(seen, known, basis.T, LIGHT_EDGE)
+    of_paper = np.tensordot(light, plane, axes=1)
+    paper = np.maximum(np.exp(light[:, :1]) - LOG_OFFSET, 0)
+    step = np.log(polar.inked(paper, paper) + LOG_OFFSET) - light[:, :1]
+    shares: np.ndarray = (values - of_paper) / np.where(step == 0, np.inf, step)[..., None]
     return shares
