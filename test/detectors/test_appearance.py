@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import cv2
 import numpy as np
 import pytest
 
@@ -26,6 +27,10 @@ from support.ring import made_up
 
 LEAST = 6.0
 """Semi-minor axis of dots, px, less than those of the sheets and scenes."""
+
+SOFT = 0.35  # deviation of half of the blur of soft ink, dot radii
+FALL = 1.1  # of ln of light across a target and its ground
+SETTINGS = DetectorSettings(family='metashape12')
 
 
 def unlike(image: np.ndarray, name: str) -> np.ndarray:
@@ -103,3 +108,18 @@ def test_light_that_is_uneven_tells_nothing() -> None:
     found = find_hypotheses(render(scene).image, DetectorSettings(family=scene.family))
     told = found.unlike[found.words > 0]
     assert len(told) >= 4 and np.isnan(told).all()
+
+
+def test_a_lamp_nearby_leaves_print_to_look_at() -> None:
+    """Light falls off across a target, to a third, and the edges of ink are soft."""
+    (sheet,) = Targets('metashape12', 6, 3).sheets()
+    image = sheet.photograph(Exposure()).astype(np.float32)
+    image = (image + cv2.GaussianBlur(image, (0, 0), SOFT * sheet.radius)) / 2
+    half = round(5 * sheet.radius)
+    for target in sheet.truth:
+        x, y = round(target.x), round(target.y)
+        part = image[max(y - half, 0) : y + half, max(x - half, 0) : x + half]
+        near = np.exp(np.linspace(0, -FALL, part.shape[1]))
+        found = find_hypotheses((part * near).astype(np.uint8), SETTINGS)
+        told = found.unlike[found.words > 0]
+        assert np.nanmin(told) < 0.05  # all were NaN

@@ -167,7 +167,7 @@ def by_levels(
 ) -> Evidence:
     """Return what levels say under light of a known spread; None: light as it is seen."""
     radii = np.array([0.5, 1.6, 2.6, 3.1, 3.9])
-    values = np.stack([of.at(np.array([[radius]]))[:, 0] for radius in radii], axis=2)
+    values = np.stack([of.at(np.array([[[radius]]]))[:, 0] for radius in radii], axis=2)
     known = values if light is None else np.full_like(values, light)
     known = known, np.full_like(values, spread)
     return level_evidence(of, values, *known, radii, NONE, BAND, shares)

@@ -37,7 +37,7 @@ def with_ends(polar: PolarImages, words: Words, overhang: np.ndarray, family: Fa
     """
     inner, outer = family.band
     radii = inner + (outer - inner) * np.tile(DEPTHS, (len(overhang), 1))
-    levels = polar.at(radii).mean(axis=1)
+    levels = polar.at(radii[..., None]).mean(axis=1)
     odds, beside, unseen = _ends(polar, levels, words, overhang, family)
     other, _, unseen_of_other = _ends(polar, levels, words.as_they_look(), overhang, family)
     ahead = words.ahead + other - odds - _UNSEEN * (unseen_of_other - unseen)

@@ -157,34 +157,20 @@ def edge_evidence(
     From the radii of the dots as printed and the growth of their colour, (k,), units of the frame.
     """
     inner, outer = band_edges(radius, growth, band)
-    beside = _BESIDE + np.maximum(polar.blur - SOFT, 0)
-    beside = np.clip(beside / polar.size, _MINIMUM_BESIDE, _MAXIMUM_BESIDE)
-    before = np.minimum(beside, 0.5 * (inner - radius - growth))
-    within = np.minimum(beside, 0.45 * (outer - inner))
-    beyond, rim = beside[:, None], polar.plate - outer[:, None]
-    on_plate = np.isfinite(rim).any()
-    if on_plate:
-        beyond = np.minimum(beyond, 0.5 * rim)
     edges = light_edges(polar, radius, growth, inner)
-    gap = np.broadcast_to((inner - before)[:, None], beyond.shape)
-    ground_at = np.stack([gap, outer[:, None] + beyond], axis=1)
-    band_at = np.stack([inner + within, outer - within], axis=1)
-    ground = polar.at(ground_at if on_plate else ground_at[..., 0])
-    inside = polar.at(band_at)
-    # Shares of ink on ground and band, without marks and with them. White paper is as white ink.
-    bare, marked = [], []
-    for at in (ground_at, band_at[..., None]):
-        of_rest = _blurred(polar, at, -np.inf, (radius + growth)[:, None])
-        if on_plate:
-            of_rest = of_rest + _blurred(polar, at, polar.plate, np.inf)
-        bare.append(of_rest)
-        marked.append(of_rest + _blurred(polar, at, inner[:, None], outer[:, None]))
+    ground_at, band_at = _beside_edges(polar, radius + growth, inner, outer)
+    ground, inside = polar.at(ground_at), polar.at(band_at)
+    # Shares of ink on ground and band, without marks and with them.
+    bare = [_rest(polar, at, radius + growth) for at in (ground_at, band_at)]
+    marked = [
+        of_rest + _blurred(polar, at, inner[:, None], outer[:, None])
+        for of_rest, at in zip(bare, (ground_at, band_at), strict=True)
+    ]
     paper, ink, *between = _step_evidence(polar, inside, ground, edges, bare, marked, shares)
     between, typical = between[: len(shares)], between[len(shares) :]
     weight = weights(polar)
-    ends = np.broadcast_to((inner + within)[:, None], beyond.shape)
-    visible = polar.reach[:, None] >= np.stack([ends, outer[:, None] + beyond], axis=1)
-    visible[:, 1] &= rim > 0
+    visible = polar.reach[:, None] >= np.maximum(ground_at, band_at)
+    visible[:, 1] &= polar.plate > outer[:, None]
     share = weight[:, None, None] * visible
     covered = np.zeros(visible.shape, bool)
     if shares:
@@ -201,6 +187,39 @@ def edge_evidence(
         covered=covered,
         blur=_blur_along(polar, band),
     )
+
+
+def _beside_edges(
+    polar: PolarImages, dot: np.ndarray, inner: np.ndarray, outer: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return radii beside the edges of bands, on ground and in the band, (k, 2, 1) or (k, 2, m).
+
+    The edges of dots and bands are at radii (k,). Where a plate ends, ground is read in the middle
+    of its rim.
+    """
+    beside = _BESIDE + np.maximum(polar.blur - SOFT, 0)
+    beside = np.clip(beside / polar.size, _MINIMUM_BESIDE, _MAXIMUM_BESIDE)
+    before = np.minimum(beside, 0.5 * (inner - dot))
+    within = np.minimum(beside, 0.45 * (outer - inner))
+    ground, band = (
+        np.stack(of, axis=1)[..., None]
+        for of in ((inner - before, outer + beside), (inner + within, outer - within))
+    )
+    if np.isfinite(polar.plate).any():
+        ground = np.repeat(ground, polar.plate.shape[1], axis=2)
+        ground[:, 1] = np.minimum(ground[:, 1], (polar.plate + outer[:, None]) / 2)
+    return ground, band
+
+
+def _rest(polar: PolarImages, at: np.ndarray, dot: np.ndarray) -> np.ndarray:
+    """Return the shares of ink at radii (k, r, m) that is not of the band, (k, r, m).
+
+    It is ink of dots with edges at radii (k,); white paper beyond plates is as white ink.
+    """
+    of_dot = _blurred(polar, at, -np.inf, dot[:, None])
+    if np.isinf(polar.plate).all():
+        return of_dot
+    return np.asarray(of_dot + _blurred(polar, at, polar.plate, np.inf))
 
 
 def _blurred(
@@ -262,7 +281,7 @@ def light_edges(
 ) -> np.ndarray:
     """Return the probabilities of an edge of light between neighbours, as gaps show it, (k,)."""
     start, width = radius + growth, inner - radius - growth
-    across = polar.at(start[:, None] + np.multiply.outer(width, _ACROSS))
+    across = polar.at((start[:, None] + np.multiply.outer(width, _ACROSS))[..., None])
     level, noise = polar.logs(across)
     step = np.abs(level[:, 0] - level[:, 1])
     many = (step**2 > LIGHT_EDGE**2 + 4 * (noise**2).sum(axis=1)).mean(axis=1)

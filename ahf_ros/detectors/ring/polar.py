@@ -132,20 +132,22 @@ class PolarImages(ArrayRecord):
         return np.stack([inside, self.plate + aside / 2], axis=1)
 
     def at(self, radii: np.ndarray) -> np.ndarray:
-        """Return gray values at radii (k, r), or at other ones at each angle, (k, r, m).
+        """Return gray values at radii (k, r, m) or, on circles, (k, r, 1), (k, r, m).
 
-        The radii are in dot radii; the gray values have shape (k, r, m).
+        The radii are in dot radii.
         """
         spacing = (self.outermost - _INNERMOST) / (self.gray.shape[2] - 1)
         place = (radii - _INNERMOST) / _along(spacing, radii)
         place = np.clip(place, 0, self.gray.shape[2] - 1.001)
         below = place.astype(np.intp)
         share = (place - below).astype(np.float32)
-        if radii.ndim == 2:
-            share, of = share[..., None], (self.row[:, None], slice(None))
-        else:
-            of = self.row[:, None, None], np.arange(radii.shape[2])
-        values, beyond = (self.gray[(*of, circle)] for circle in (below, below + 1))
+        row, angles = self.row[:, None], np.arange(radii.shape[2])
+        values, beyond = (
+            self.gray[row, :, circle[..., 0]]  # in one piece
+            if len(angles) == 1
+            else self.gray[row[..., None], angles, circle]
+            for circle in (below, below + 1)
+        )
         values *= 1 - share
         beyond *= share
         values += beyond
@@ -344,7 +346,7 @@ def on_dark_ground(
     if not bright.size:
         return polar
     some = polar.select(bright)
-    gap = some.at(np.tile(1 + (inner - 1) * GAP, (len(bright), 1))).mean(axis=1)
+    gap = some.at(np.tile(1 + (inner - 1) * GAP, (len(bright), 1))[..., None]).mean(axis=1)
     aside = np.maximum(SOFT_EDGE * some.blur / some.size, _ASIDE)
     steps = some.levels(some.gray[some.row]) - some.levels(gap)[..., None]
     votes = np.sign(steps + _WHITE * np.log(some.contrast)[:, None, None])
@@ -362,9 +364,7 @@ def on_dark_ground(
 
 
 @lru_cache(maxsize=16)
-def _outlines(
-    count: int, circles: int, outer: float
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _outlines(count: int, circles: int, outer: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return radii of discs and squares at some angles, (shapes, m), largest first.
 
     Then comes how many circles lie beyond, less one, -1 where none does, and what votes for a

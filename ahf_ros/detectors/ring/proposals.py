@@ -215,7 +215,7 @@ def _holes(polar: PolarImages, outer: np.ndarray) -> np.ndarray:
         return holes
     polar, outer = polar.select(bright), outer[bright]
     inside, outside = (
-        polar.levels(polar.at(radii))
+        polar.levels(polar.at(radii[..., None]))
         for radii in (np.tile(DOT, (len(outer), 1)), outer[:, None] + MARGIN)
     )
     usual = medians(inside.reshape(len(outer), -1))[:, None, None]
