@@ -310,8 +310,8 @@ def report(
     """
     major, _, _ = frame.ellipse_axes(hypotheses.frames)
     whole = settings.report_undecoded & (hypotheses.share >= WHOLE)
-    minimum, maximum = settings.radii
-    of_size = (major >= minimum) & (major <= maximum)
+    # The kind's own minimum is where dots are looked for; what is read of smaller ones is read.
+    of_size = (major >= settings.min_radius) & (major <= settings.max_radius)
     hypotheses = among_others(hypotheses.select(of_size))
     hypotheses = settle_same_prints(hypotheses, settings.codes(Family))
     whole = whole[of_size]
