@@ -42,6 +42,7 @@ EIGHT, TWO = (
     DOTS_DESIGN.read_text()
     .replace('"bits": 10', f'"bits": {bits}')
     .replace('"border_radius": 3.2', '"border_radius": 3.4')
+    .replace('"family": "dots"', '"family": "mydots"')
     for bits in (8, 2)
 )
 
@@ -153,16 +154,20 @@ def test_stripes_defeat_the_published_methods_and_ahf_brings_the_targets_back(
 
 
 @pytest.mark.parametrize(
-    ('family', 'text', 'changes'),
-    [('gsi', SIX, {'width': 900, 'dot_radius': 5.0, 'seed': 2}), ('dots', EIGHT, {'seed': 5})],
+    ('family', 'own', 'text', 'changes'),
+    [
+        ('gsi', 'six', SIX, {'width': 900, 'dot_radius': 5.0, 'seed': 2}),
+        ('dots', 'mydots', EIGHT, {'seed': 5}),
+    ],
 )
 def test_a_design_of_ones_own_is_printed_and_identified(
-    tmp_path: Path, family: str, text: str, changes: dict
+    tmp_path: Path, family: str, own: str, text: str, changes: dict
 ) -> None:
     path = tmp_path / 'own.yaml'
     path.write_text(text)
     shown = scene(family, family_file=str(path), **changes)
-    found = create_detector(family=family, family_file=str(path))(shown.image)
+    found = create_detector(family=own, family_file=str(path))(shown.image)
+    assert {it.family for it in found} == {own}
     assert counted(shown, found) == (len(shown.targets), 0, 0)
     assert [it.code for it in found] == [it.code for it in shown.targets]
     assert np.hypot(*errors(shown, found).T).max() < 0.05

@@ -23,7 +23,6 @@ import numpy as np
 from ahf_ros.codes.dots import DotFamily
 from ahf_ros.detectors.claims import best_targets
 from ahf_ros.detectors.contract import DetectorSettings, FamilyDetector
-from ahf_ros.detectors.dots.rings import FAMILY
 from ahf_ros.features.ellipse_targets import targets_from_frames
 from ahf_ros.features.frame import affine_frames, circle_points, project
 from ahf_ros.features.sampling import sample, within
@@ -212,7 +211,7 @@ def _identified(
     covariance = error[:, None, None] * np.eye(2)
     shown = np.flatnonzero(inside)
     ids, codes, certainty = ids[shown], code.canonical(words)[shown], certainty[shown]
-    return targets_from_frames(frames[shown], covariance[shown], ids, codes, certainty, FAMILY)
+    return targets_from_frames(frames[shown], covariance[shown], ids, codes, certainty, code.name)
 
 
 def _develop(

@@ -34,7 +34,6 @@ _RAYS = 40  # round each circle
 _REACH = 0.3  # how far from a circle its edge is looked for, radii of the disc: half the border
 _MINIMUM_REACH = 1.35  # the same of small discs, px: what a profile needs
 
-FAMILY = 'dots'  # whichever data file describes it
 CERTAIN = 0.95  # confidence from which a target is reported
 WEIGHTS = Path(__file__).with_name('fitted_weights.json')
 
@@ -199,11 +198,11 @@ def _read_part(pyramid: ImagePyramid, discs: Dots, code: DotFamily) -> Rings:
 def report(rings: Rings, settings: DetectorSettings, code: DotFamily) -> list[DottedTarget]:
     """Return one target for each place and each ID, the most certain one."""
     major = ellipse_axes(rings.frames)[0]
-    minimum, maximum = settings.radii
     ids = code.ids(rings.words)
     decoded = (rings.of_word >= CERTAIN) & (ids > 0)
     shown = decoded | (settings.report_undecoded & (rings.whole | (rings.of_target >= CERTAIN)))
-    which = np.flatnonzero(shown & (major >= minimum) & (major <= maximum))
+    of_size = (major >= settings.min_radius) & (major <= settings.max_radius)
+    which = np.flatnonzero(shown & of_size)
     targets = _targets(rings.select(which), np.where(decoded, ids, UNDECODED)[which], code)
     return best_targets(targets, code.border_radius)
 
@@ -220,7 +219,7 @@ def _targets(rings: Rings, ids: np.ndarray, code: DotFamily) -> list[DottedTarge
             code=of_code,
             confidence=sure,
             polarity=sign,
-            family='' if identifier == UNDECODED else FAMILY,
+            family='' if identifier == UNDECODED else code.name,
             dots=_ellipses(frame, word, phase, radius, code),
             template_dots=2,
             **place,

@@ -220,7 +220,7 @@ def report(hypotheses: Hypotheses, code: PointFamily) -> list[Target]:
             id=code.number(word) or 0,
             code=word,
             confidence=confidence,
-            family='gsi',  # whichever data file describes it
+            family=code.name,
             template_dots=len(code.template),
             polarity=polarity,
             **place,
