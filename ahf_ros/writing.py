@@ -14,13 +14,11 @@ from __future__ import annotations
 import errno
 import json
 import os
-import sqlite3
 import stat
 import sys
 import time
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager, suppress
-from hashlib import sha256
 from importlib import import_module
 from pathlib import Path, PurePath
 from typing import IO, Any, BinaryIO
@@ -188,6 +186,8 @@ def locked(folder: str | Path, lock_timeout: float = 0.0) -> Iterator[None]:
 def _lock_of(folder: str | Path) -> Iterator[Callable[[], bool]]:
     """Yield what tries to lock a folder and returns whether it could."""
     if _fcntl is None:  # folders cannot be locked; a database can, by any process
+        import sqlite3
+
         database = sqlite3.connect(Path(folder, _LOCK_FILE), timeout=0, isolation_level=None)
 
         def locked_database() -> bool:
@@ -291,14 +291,20 @@ def _is_as_written(file: IO[bytes], about: object) -> bool:
     """Return whether a file is what a manifest has about it."""
     if not isinstance(about, dict) or about.get('size') != os.fstat(file.fileno()).st_size:
         return False
+    return about.get('sha256') == _sha256(iter(lambda: file.read(_PART), b''))
+
+
+def _sha256(parts: Iterable[bytes]) -> str:
+    from hashlib import sha256  # it loads OpenSSL, which nodes do without
+
     digest = sha256()
-    while part := file.read(_PART):
+    for part in parts:
         digest.update(part)
-    return about.get('sha256') == digest.hexdigest()
+    return digest.hexdigest()
 
 
 def _about(content: bytes) -> dict[str, Any]:
-    return {'size': len(content), 'sha256': sha256(content).hexdigest()}
+    return {'size': len(content), 'sha256': _sha256([content])}
 
 
 def _former(folder: Path, main: str) -> Iterator[str]:

@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import threading
+import time
 import traceback
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import CancelledError
+from contextlib import suppress
 from functools import partial
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
+from rclpy.exceptions import InvalidHandle
 from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
 from rclpy.lifecycle.node import LifecycleNodeMixin
-from rclpy.qos import QoSProfile
+from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_srvs.srv import Trigger
 
 from ahf_ros import ending
@@ -22,8 +25,9 @@ from ahf_ros.nodes.diagnostics import PERIOD, Diagnostics, Tally, publish_status
 from ahf_ros.nodes.image_queue import ImageQueue, Worker
 from ahf_ros.nodes.inputs import Input
 from ahf_ros.nodes.parameters import ParameterSettings
+from ahf_ros.nodes.patience import TRIGGERED
 from ahf_ros.nodes.pipeline import STOPPING, Pipeline
-from ahf_ros.nodes.process import ProcessNode
+from ahf_ros.nodes.process import ProcessNode, release_memory
 from ahf_ros.nodes.service_detector import ServiceDetector
 from ahf_ros.nodes.settings import LOSSLESS, SERVICE, DetectorNodeSettings
 from ahf_ros.nodes.topics import (
@@ -36,12 +40,18 @@ from ahf_ros.nodes.topics import (
     declare_topics,
     image_topic,
 )
-from ahf_ros.nodes.watch import Watch
+from ahf_ros.nodes.watch import Expected, Watch
 from ahf_ros.srv import Identify
 from ahf_ros.text import printable
 
 ACTIVE = 'active'
 """State of a node that works."""
+
+NO_ANSWERS = '/diagnostics', '/parameter_events'
+"""Topics that are published without images."""
+
+IDLE = 3.0
+"""Time without an image after which a node gives back the memory that it keeps for the next, s."""
 
 REQUESTS_KEPT = 1000
 """Requests to a service that may wait. The middleware drops more without an answer."""
@@ -60,6 +70,9 @@ class DetectorNode(ProcessNode, LifecycleNodeMixin):
     def __init__(self) -> None:
         super().__init__('detector')
         self.listen(False)
+        self._active = False
+        self._rested = (False, False)
+        self._matching = threading.Lock()
         self._stopping = threading.Event()
         self._worker = Worker()
         self._tally = Tally()
@@ -150,13 +163,31 @@ class DetectorNode(ProcessNode, LifecycleNodeMixin):
 
     def activate(self) -> None:
         """Subscribe to images, and answer those that wait."""
-        self.listen(True)
+        self._active = True
+        self.matched()
         self._worker.resume()
 
     def deactivate(self) -> None:
         """Stop to receive and to answer images; those that wait are kept."""
-        self.listen(False)
+        self._active = False
+        self.matched()
         self._worker.pause()
+
+    def matched(self) -> None:
+        """Receive images as long as the node is active and somebody asks for answers."""
+        with self._matching:
+            self.listen(self._active and self._asked())
+
+    def _asked(self) -> bool:
+        """Return whether anybody subscribes to answers, or they are kept for those who will."""
+        unasked = {self.resolve_topic_name(it) for it in NO_ANSWERS}
+        kept = DurabilityPolicy.TRANSIENT_LOCAL
+        for it in self.publishers:
+            with suppress(InvalidHandle):  # it has been destroyed meanwhile
+                asked = it.get_subscription_count() or it.qos_profile.durability == kept
+                if asked and it.topic_name not in unasked:
+                    return True
+        return self._settings.on('always')
 
     def cleanup(self) -> None:
         """Give up detector, subscriptions and the images that wait."""
@@ -226,6 +257,7 @@ class DetectorNode(ProcessNode, LifecycleNodeMixin):
             # The callback may write to the disk and must not block the others.
             group = MutuallyExclusiveCallbackGroup()
             self._images = self.subscribe(kind, topic, self._queue.put, group, lossless)
+        self.matched()
 
     def _service_detector(self, settings: DetectorNodeSettings) -> ServiceDetector | None:
         """Return the detector that calls a service, if the settings name it."""
@@ -263,6 +295,18 @@ class DetectorNode(ProcessNode, LifecycleNodeMixin):
         state = self.state
         self._tally.inactive = '' if state == ACTIVE else state
         if self._images and state == ACTIVE:
-            timeout = self._settings.current.image_timeout
-            self._watch.look(self._images, timeout, self._answers.waiting())
+            self.matched()
+            settings = self._settings.current
+            self._tally.unasked = not self._listening
+            # Of what is not subscribed to, nothing is expected.
+            acquisition = settings.acquisition if self._listening else TRIGGERED
+            expected = Expected(settings.image_timeout, acquisition, self._worker.busy)
+            self._watch.look(self._images, expected, self._answers.waiting())
+            self._rest(time.monotonic() - self._images.arrived > IDLE and not expected.busy)
         return self._diagnostics.status(PERIOD)
+
+    def _rest(self, idle: bool) -> None:
+        """Give memory back once the node has become idle, or nobody asks for answers any more."""
+        before, self._rested = self._rested, (idle, self._listening)
+        if idle and self._rested != before:
+            release_memory()

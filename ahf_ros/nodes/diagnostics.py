@@ -126,6 +126,7 @@ class Tally(Stamps):
     advice: str = ''  # what may help where images in a row do not show what they should
     behind: int = 0  # images dropped since none last waited after an identification
     inactive: str = ''  # state of a managed node that is not active
+    unasked: bool = False  # whether nobody subscribes to answers
     latency: float = 0.0  # from the arrival of the last image to its answer, s
     last: Identification = field(default_factory=lambda: Identification(()))
     clouds: CloudTally | None = None  # None while they are not subscribed to
@@ -172,6 +173,8 @@ class Diagnostics:
         before, self._before = self._before, replace(tally, clouds=copy(tally.clouds))
         answered = tally.answered - before.answered
         reports, message = _reports_of_images(tally, before), f'{answered} images identified'
+        if tally.unasked:
+            message = 'nobody subscribes to answers, and always is False: no image is identified'
         if tally.inactive:
             reports, message = (), f'the node is {tally.inactive}'
         unknown = f', not counted: {tally.lost_unknown}' if tally.lost_unknown else ''

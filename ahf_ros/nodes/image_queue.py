@@ -84,15 +84,12 @@ class ImageQueue:
         self._families: tuple[str, ...] = ()  # that are settled
         self.pipeline: Pipeline  # in force
         self._begin()
-        # It is never cancelled: rclpy ends the node where one thread cancels a timer that is due
-        # while another is about to call it.
-        node.every(0.05, self._look)
 
     def _begin(self) -> None:
         self._waiting: deque[_Waiting] = deque()
         self._messages = WaitingMessages()
         self._last: _Waiting | None = None
-        self._looking = False
+        self._overdue = threading.Timer(0.0, self._look)
 
     def renew(self, pipeline: Pipeline) -> None:
         """Identify the images that arrive from now on by a pipeline; it begins a new stack."""
@@ -169,7 +166,10 @@ class ImageQueue:
             self._end(last, 'parameters changed')
         elif last and last.number != image.number - 1:
             self._tally.dropped += stream.forget()
+        self._overdue.cancel()
         self._handle(image, stream.add(lambda: message_frame(image.take())))
+        if stream.waiting:
+            self._expect(image.pipeline.settings.stack_timeout)
         with self._lock:
             if not self._waiting:
                 self._tally.behind = 0
@@ -179,15 +179,20 @@ class ImageQueue:
         if self._last and self._last.pipeline is not self.pipeline:
             self._end(self._last, 'parameters changed')
 
+    def _expect(self, limit: float) -> None:
+        """End the stack if its next image does not come in time, s.
+
+        This is no timer of rclpy, which ends the node where one thread cancels a timer that is due
+        while another is about to call it.
+        """
+        self._overdue = threading.Timer(limit, self._look)
+        self._overdue.daemon = True
+        self._overdue.start()
+
     def _look(self) -> None:
-        last = self._last
-        if last and last.pipeline.stream.waiting and not self._looking:
-            self._looking = True
-            self._worker.append(self._end_overdue)
+        self._worker.append(self._end_overdue)
 
     def _end_overdue(self) -> None:
-        """End a stack if its next image has not come in time."""
-        self._looking = False
         last = self._last
         if last and last.pipeline.stream.waiting:
             limit = last.pipeline.settings.stack_timeout
@@ -250,15 +255,22 @@ class Worker:
         self._thread = ThreadPoolExecutor(max_workers=1)
         self._turn = threading.Condition()  # held while a job runs
         self._paused = self._stopped = False
+        self._last: Future[Any] | None = None
+
+    @property
+    def busy(self) -> bool:
+        """Whether a job runs or waits."""
+        return self._last is not None and not self._last.done()
 
     def append(self, job: Callable[[], Result]) -> Future[Result]:
         """Run `job`, unless the worker is stopped first, which cancels it."""
+        future: Future[Result]
         try:
-            return self._thread.submit(self._in_turn, job)
+            future = self._last = self._thread.submit(self._in_turn, job)
         except RuntimeError:  # stopped
-            future: Future[Result] = Future()
+            future = Future()
             future.cancel()
-            return future
+        return future
 
     def call(self, job: Callable[[], Result]) -> Result:
         """Run `job` and return its result, or raise its error.

@@ -17,6 +17,7 @@ from rcl_interfaces.msg import SetParametersResult
 from rcl_interfaces.srv import SetParametersAtomically
 from rclpy.callback_groups import CallbackGroup
 from rclpy.clock import Clock, ClockType
+from rclpy.event_handler import PublisherEventCallbacks
 from rclpy.exceptions import InvalidHandle, ParameterException
 from rclpy.executors import MultiThreadedExecutor
 from rclpy.logging import LoggingSeverity, get_logger_effective_level, set_logger_level
@@ -25,11 +26,13 @@ from rclpy.parameter import Parameter
 from rclpy.publisher import Publisher
 from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
+from rclpy.topic_endpoint_info import TopicEndpointInfo
 from rclpy.utilities import remove_ros_args
 
 from ahf_ros.ending import ignore_ending, signalled
 from ahf_ros.nodes.inputs import Input
 from ahf_ros.nodes.parameters import unknown_parameters
+from ahf_ros.nodes.processes import Processes
 from ahf_ros.nodes.topics import PUBLISHER, declare_qos, qos_profile
 from ahf_ros.text import reason_of, shown
 
@@ -90,6 +93,8 @@ class ProcessNode(Node):
         self.ended = Ending()  # an exit status ends the node, as a signal does
         self._inputs: list[Input] = []
         self._listening = True
+        present = super().get_publishers_info_by_topic('/parameter_events')  # each node has one
+        self._processes = Processes(it.endpoint_gid for it in present)
         self.every(1.0, self._follow)
 
     def introduction(self) -> str:
@@ -135,6 +140,13 @@ class ProcessNode(Node):
             response.result = refused
         return response
 
+    def get_publishers_info_by_topic(
+        self, topic_name: str, no_mangle: bool = False
+    ) -> list[TopicEndpointInfo]:
+        """Return who publishes on a topic, without processes that were killed."""
+        found = super().get_publishers_info_by_topic(topic_name, no_mangle)
+        return [it for it in found if not self._processes.ended(it.endpoint_gid)]
+
     def close(self) -> None:
         """End the threads of the node, while topics and the log still work."""
 
@@ -145,7 +157,11 @@ class ProcessNode(Node):
     def publisher(self, kind: type, topic: str, depth: int = 1) -> Publisher:
         """Return a publisher, reliable and of this depth unless `qos_overrides` differ."""
         profile = qos_profile(declare_qos(self, PUBLISHER, topic, depth))
-        return self.create_publisher(kind, topic, profile)
+        events = PublisherEventCallbacks(matched=lambda _: self.matched())
+        return self.create_publisher(kind, topic, profile, event_callbacks=events)
+
+    def matched(self) -> None:
+        """Take note that somebody has begun or ceased to subscribe to what `publisher` made."""
 
     def subscribe(
         self,
@@ -255,6 +271,12 @@ def reuse_memory() -> None:
         mallopt(_M_ARENA_MAX, 2)
         mallopt(_M_MMAP_THRESHOLD, 32 * 2**20)  # the maximum of glibc
         mallopt(_M_TRIM_THRESHOLD, 256 * 2**20)  # buffers of an image of 10 MP
+
+
+def release_memory() -> None:
+    """Give memory back that `reuse_memory` keeps, where no further image is expected."""
+    with suppress(AttributeError):
+        ctypes.CDLL(None).malloc_trim(0)
 
 
 def _end_at_signal(ended: Future, arrived: int) -> None:

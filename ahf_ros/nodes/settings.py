@@ -10,6 +10,7 @@ from importlib.util import find_spec
 from ahf_ros.cloud_settings import MAXIMUM_TOLERANCE, CloudSettings
 from ahf_ros.codes.families import families_of
 from ahf_ros.detectors import DETECTOR, detector_name
+from ahf_ros.nodes.patience import CONTINUOUS, TRIGGERED, UNKNOWN
 from ahf_ros.registration_settings import RegistrationSettings, check_frame, unit_parameter
 from ahf_ros.session import create_identifier
 from ahf_ros.session_settings import IdentificationSettings, StackSettings
@@ -125,10 +126,20 @@ class DetectorNodeSettings:
     )
     image_timeout: float = parameter(
         10.0,
-        'Time without an image, or of an image without its cloud, after which the diagnostics '
-        'warn and say why, s; 0: never.',
+        'Time without an image that should come, or of an image without its cloud, after which '
+        'the diagnostics warn and say why, s; 0: never.',
         minimum=0.0,
         maximum=86400.0,
+    )
+    acquisition: str = parameter(
+        UNKNOWN,
+        'When images come. continuous: all the time, silence is a warning; triggered: when the '
+        'camera is triggered, silence is none; unknown: silence is one until the first image.',
+        choices=(UNKNOWN, TRIGGERED, CONTINUOUS),
+    )
+    always: bool = parameter(
+        False,
+        'Whether to identify images also while nobody subscribes to what the node publishes.',
     )
     stacking: StackSettings = field(default_factory=StackSettings)
     identification: NodeIdentificationSettings = field(default_factory=NodeIdentificationSettings)

@@ -5,16 +5,18 @@ from __future__ import annotations
 import re
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from difflib import get_close_matches
 from functools import partial
 
-from rclpy.qos import QoSCompatibility, ReliabilityPolicy, qos_check_compatible
+from rclpy.qos import QoSCompatibility, QoSProfile, ReliabilityPolicy, qos_check_compatible
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 from ahf_ros.cloud_settings import MAXIMUM_TOLERANCE
 from ahf_ros.interchange.matching import ANSWER, CLOUD, Waiting
 from ahf_ros.nodes.diagnostics import Tally
 from ahf_ros.nodes.inputs import Input
+from ahf_ros.nodes.patience import TRIGGERED, UNKNOWN, Patience
 from ahf_ros.nodes.process import ProcessNode
 from ahf_ros.nodes.topics import CODED_TARGETS, qos_words
 
@@ -22,6 +24,40 @@ AGAIN = 10.0
 """Time without a report after which it is logged again, s."""
 
 _NUMBERS = re.compile(r'\d+(, \d+)*( and \d+ more)?')  # these alone make no other report
+
+
+@dataclass(frozen=True, slots=True)
+class Expected:
+    """What is expected of the publishers of a topic."""
+
+    timeout: float  # of silence that is a warning, s; 0: none is
+    acquisition: str = TRIGGERED
+    busy: bool = False  # whether the node is at work on what they sent
+
+
+class Silence:
+    """Says of a topic that nothing arrives, as long as this means something."""
+
+    def __init__(self, node: ProcessNode, what: str) -> None:
+        self._topics = partial(topics_of_others, node)
+        self._what = what
+        self._patience = Patience(time.monotonic())
+
+    def look(
+        self, source: Input, publishers: Sequence[TopicEndpointInfo], expected: Expected
+    ) -> str:
+        """Return for how long nothing has arrived, and why; empty if that is as expected."""
+        ours = [it for it in publishers if it.topic_type == source.type_name]
+        patience = self._patience
+        identifiers = frozenset(tuple(it.endpoint_gid) for it in ours)
+        patience.look(time.monotonic(), identifiers, source.arrived, expected.busy)
+        fit = not unfit(source, ours)
+        if not patience.ended(expected.timeout, expected.acquisition, fit):
+            return ''
+        why = silence(source, publishers, self._topics)
+        if ours and fit and expected.acquisition == UNKNOWN:
+            why += '; with acquisition triggered, that is no warning'
+        return f'no {self._what} for {patience.waited:.0f} s: {why}'
 
 
 class Watch:
@@ -33,14 +69,18 @@ class Watch:
     def __init__(self, node: ProcessNode, tally: Tally) -> None:
         self._node = node
         self._tally = tally
-        self._topics = partial(topics_of_others, node)
+        self._silence = Silence(node, 'image')
         self._reported: dict[str, float] = {}  # when what was last to be said, s
 
-    def look(self, images: Input, timeout: float, clouds: tuple[Input, Waiting] | None) -> None:
+    def look(
+        self,
+        images: Input,
+        expected: Expected,
+        clouds: tuple[Input, Waiting] | None,
+    ) -> None:
         """Bring the tally up to date.
 
-        What has been waited for longer than `timeout`, s, is reported; 0: never. `clouds` are
-        where clouds come from, and what waits for its match.
+        `clouds` are where clouds come from, and what waits for its match.
         """
         tally, publishers = self._tally, images.publishers()
         tally.mistaken = other_types(images, publishers)
@@ -48,24 +88,21 @@ class Watch:
         tally.twins = self._twins()
         tally.lost += images.losses.newly_lost()
         tally.lost_unknown = images.losses.unknown
-        tally.silent = why = waiting = ''
-        silent = time.monotonic() - images.arrived
-        if timeout and silent > timeout:
-            why = silence(images, publishers, self._topics)
-            tally.silent = f'no image for {silent:.0f} s: {why}'
-        if clouds and timeout and clouds[1].seconds[ANSWER] > timeout:
+        tally.silent = self._silence.look(images, publishers, expected)
+        waiting = ''
+        if clouds and expected.timeout and clouds[1].seconds[ANSWER] > expected.timeout:
             waiting = self._unmatched(*clouds)
         if tally.clouds:
             tally.clouds.waiting = waiting
             tally.clouds.lost += clouds[0].losses.newly_lost() if clouds else 0
         said = tally.mistaken, tally.several, tally.twins, tally.slow, tally.advice
-        self._log(*said, why, waiting)
+        self._log(*said, tally.silent.partition(': ')[2], waiting)
 
     def _unmatched(self, source: Input, waiting: Waiting) -> str:
         """Return why images wait for their clouds."""
         images, clouds = waiting.counts[ANSWER], waiting.counts[CLOUD]
         if not clouds:
-            reason = silence(source, source.publishers(), self._topics)
+            reason = silence(source, source.publishers(), partial(topics_of_others, self._node))
             return f'{images} images wait for a cloud: {reason}'
         text, apart = f'{images} images and {clouds} clouds wait for each other', waiting.nearest
         if apart > MAXIMUM_TOLERANCE * 1e9:
@@ -81,9 +118,8 @@ class Watch:
         """Return a message if another node has the same name, or publishes on the same topic."""
         node = self._node
         own = node.get_fully_qualified_name()
-        names = [
-            f'{space.rstrip("/")}/{name}' for name, space in node.get_node_names_and_namespaces()
-        ]
+        every = node.get_publishers_info_by_topic('/parameter_events')  # each node has one
+        names = list(map(_node, every))
         if (count := names.count(own)) > 1:
             return f'{count} nodes are named {own}: give one another name by -r __node:=OTHER'
         topic = node.resolve_topic_name(CODED_TARGETS)
@@ -148,16 +184,11 @@ def silence(
         return other_types(source, publishers)
     if not ours:
         return f'nobody publishes {source.type_name} on {source.name}{_nearby(source, topics())}'
-    unfit = [
-        it.qos_profile
-        for it in ours
-        if qos_check_compatible(it.qos_profile, source.profile)[0] == QoSCompatibility.ERROR
-    ]
-    if unfit:
+    if offered := unfit(source, ours):
         return (
-            f'{len(unfit)} of {len(ours)} publishers on {source.name} '
-            f'offer{"s" if len(unfit) == 1 else ""} '
-            f'{" and ".join(sorted(set(map(qos_words, unfit))))}, which a subscription that is '
+            f'{len(offered)} of {len(ours)} publishers on {source.name} '
+            f'offer{"s" if len(offered) == 1 else ""} '
+            f'{" and ".join(sorted(set(map(qos_words, offered))))}, which a subscription that is '
             f'{qos_words(source.profile)} does not receive: '
             f'set {source.overrides} to what all of them offer'
         )
@@ -171,6 +202,16 @@ def silence(
             'larger buffers of the network'
         )
     return text
+
+
+def unfit(source: Input, publishers: Iterable[TopicEndpointInfo]) -> list[QoSProfile]:
+    """Return the quality of service of publishers that a subscription does not receive from."""
+    offered = (it.qos_profile for it in publishers)
+    return [
+        it
+        for it in offered
+        if qos_check_compatible(it, source.profile)[0] == QoSCompatibility.ERROR
+    ]
 
 
 def _nearby(source: Input, topics: Mapping[str, Sequence[str]]) -> str:
