@@ -67,17 +67,22 @@ class Scans(Registration):
         minimum_confidence: float,
         stamp: int = 0,
         frame_id: str = '',
+        scanner: str = '',
     ) -> RegisteredScan:
-        """Register a scan by its `TARGET_POINT`s; a ValueError says why it does not fit."""
-        if self.records and stamp < self.records[-1].stamp:
+        """Register a scan by its `TARGET_POINT`s; a ValueError says why it does not fit.
+
+        The scans of each scanner come in the order of their stamps, ns; 0 is no stamp.
+        """
+        last = max((it.stamp for it in self.records if it.scanner == scanner), default=0)
+        if last and stamp <= last:
+            relation = 'before' if stamp < last else 'like'
             raise ValueError(
-                f'stamp is {stamp / 1e9:.9f} s, before that of the last scan, '
-                f'{self.records[-1].stamp / 1e9:.9f} s; accepted is a later one, or ~/reset of '
-                'the node'
+                f'stamp is {stamp / 1e9:.9f} s, {relation} that of the last scan, '
+                f'{last / 1e9:.9f} s; accepted is a later one, or ~/reset of the node'
             )
         found = self.add(target_scan(target_points, minimum_confidence))
         name = f'{self._names}{len(self.records) + 1}'
-        self.records.append(ScanRecord(name, stamp, frame_id))
+        self.records.append(ScanRecord(name, stamp, frame_id, scanner))
         return found
 
     def last(self) -> str:

@@ -8,7 +8,7 @@ from launch.actions import DeclareLaunchArgument, SetEnvironmentVariable, Shutdo
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 
-from ahf_ros.nodes.launching import config, declared
+from ahf_ros.nodes.launching import config, declared, default_argument
 from ahf_ros.synthetic.patterns import LIGHT_NAMES
 
 PARAMETERS = {
@@ -16,7 +16,14 @@ PARAMETERS = {
         config('illumination.yaml'),
         {'light': LaunchConfiguration('light'), 'rate': 0.2},
     ],
-    'detector': [config('detector.yaml'), {'expected_targets': 54, 'max_duration': 20.0}],
+    'detector': [
+        config('detector.yaml'),
+        {
+            'expected_targets': 54,
+            'max_duration': 20.0,
+            'image_timeout': LaunchConfiguration('image_timeout'),
+        },
+    ],
     'scoreboard': [],
 }
 
@@ -33,7 +40,8 @@ def generate_launch_description():
                     default_value='stripe',
                     choices=list(LIGHT_NAMES),
                     description='Light that is projected onto the targets.',
-                )
+                ),
+                default_argument('detector', 'image_timeout'),
             ),
             *(SetEnvironmentVariable(name, profiles) for name in variables),
             *(

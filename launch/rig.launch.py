@@ -2,6 +2,9 @@
 
 ros2 launch ahf_ros rig.launch.py driver:=zivid start_driver:=true registration:=true \\
     pose:=true coordinates:=targets.csv unit:=mm
+
+Two scanners are two of these in namespaces, one of them with registration:=true and
+scanners:=left,right.
 """
 
 from launch import LaunchDescription
@@ -73,5 +76,5 @@ def nodes(context):
     started += [made(given, driver) for node, made in more.items() if given[node] == 'true']
     if given['start_driver'] == 'true':
         chosen = {name: given[f'driver_{name}'] for name in OF_DRIVER}
-        started.append(driver_node(driver, **chosen))
+        started.append(driver_node(driver, given['namespace'], **chosen))
     return [*without_effect(given), *started]

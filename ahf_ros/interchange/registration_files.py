@@ -31,6 +31,7 @@ class ScanRecord:
     name: str
     stamp: int = 0
     frame_id: str = ''
+    scanner: str = ''  # name, where there are several
 
 
 def in_common_frame(cloud: np.ndarray, transform: Transform) -> np.ndarray:

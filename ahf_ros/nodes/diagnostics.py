@@ -61,15 +61,29 @@ class Stamps:
     """Stamps of images since the start."""
 
     backwards: int = 0  # whose stamp is earlier than the stamp before
+    repeated: int = 0  # whose stamp is that of the image before
     stamp: int = 0  # of the last image, ns
 
     def compare_stamps(self, header: Header) -> str:
-        """Count stamps that go backwards, as when a replay starts over; return what to report."""
+        """Count stamps that do not go forwards, as in a replay that starts over; return a report.
+
+        Stamps of 0 are none.
+        """
         before, self.stamp = self.stamp, nanoseconds(header)
-        if self.stamp >= before:
+        text = f'stamp is {seconds(self.stamp)}, that of the image before is {seconds(before)}'
+        if self.stamp < before:
+            self.backwards += 1
+        elif self.stamp and self.stamp == before:
+            self.repeated += 1
+            text = f'stamp is {seconds(self.stamp)} twice: answers cannot be told apart by it'
+        elif header.stamp.nanosec >= 10**9:
+            text = (
+                f'stamp.nanosec is {header.stamp.nanosec}, accepted is less than 10^9: it counts '
+                f'as {seconds(self.stamp)}'
+            )
+        else:
             return ''
-        self.backwards += 1
-        return f'stamp is {seconds(self.stamp)}, that of the image before is {seconds(before)}'
+        return text
 
 
 @dataclass(slots=True)
@@ -190,6 +204,7 @@ class Diagnostics:
             'last reason for rejection': tally.reason,
             'damaged': tally.damaged,
             'stamps that went backwards': tally.backwards,
+            'stamps that came twice': tally.repeated,
             'changes of size or encoding': tally.changes,
             'stacks that were not full': tally.incomplete,
             'stacks that were split': tally.split,
@@ -214,7 +229,7 @@ def _reports_of_images(tally: Tally, before: Tally) -> tuple[object, ...]:
     clouds, clouds_before = tally.clouds or CloudTally(), before.clouds or CloudTally()
     rejected = tally.rejected - before.rejected
     rejected_clouds = clouds.rejected - clouds_before.rejected
-    backwards = tally.backwards - before.backwards
+    backwards, repeated = tally.backwards - before.backwards, tally.repeated - before.repeated
     incomplete, split = tally.incomplete - before.incomplete, tally.split - before.split
     changes, lost = tally.changes - before.changes, tally.lost - before.lost
     damaged = tally.damaged - before.damaged
@@ -226,6 +241,7 @@ def _reports_of_images(tally: Tally, before: Tally) -> tuple[object, ...]:
         rejected_clouds and f'{rejected_clouds} clouds rejected: {clouds.reason}',
         clouds.waiting,
         backwards and f'{backwards} stamps went backwards',
+        repeated and f'{repeated} stamps came twice',
         (incomplete or split) and f'{incomplete} stacks were not full, {split} were split',
         lost and tally.lossless and f'{lost} images were lost in transport; {LOSS_REMEDY}',
         tally.several,
@@ -241,7 +257,8 @@ def _reports_of_images(tally: Tally, before: Tally) -> tuple[object, ...]:
 
 def seconds(stamp: int) -> str:
     """Return a stamp, ns, in words."""
-    return f'{stamp // 10**9}.{stamp % 10**9:09} s'
+    sign = '-' if stamp < 0 else ''
+    return f'{sign}{abs(stamp) // 10**9}.{abs(stamp) % 10**9:09} s'
 
 
 @dataclass(slots=True)
@@ -289,6 +306,7 @@ class PoseDiagnostics:
             'ambiguous': tally.ambiguous,
             'lost in transport': tally.lost,
             'stamps that went backwards': tally.backwards,
+            'stamps that came twice': tally.repeated,
             'images with targets left out': tally.wrong,
             'last targets left out': tally.rejected,
             'IDs without coordinates': tally.unknown,
@@ -302,7 +320,8 @@ def _reports_of_poses(tally: PoseTally, before: PoseTally) -> tuple[object, ...]
     """Return everything that is wrong since the last status, and empty texts and zeros."""
     refused = tally.refused - before.refused
     ambiguous = tally.ambiguous - before.ambiguous
-    backwards, wrong = tally.backwards - before.backwards, tally.wrong - before.wrong
+    backwards, repeated = tally.backwards - before.backwards, tally.repeated - before.repeated
+    wrong = tally.wrong - before.wrong
     lost = tally.lost - before.lost
     misfit = tally.published > before.published and tally.sigma0 > MISFIT
     return (
@@ -318,5 +337,6 @@ def _reports_of_poses(tally: PoseTally, before: PoseTally) -> tuple[object, ...]
         'calibration, camera_matrix or coordinates',
         tally.rectified,
         backwards and f'{backwards} stamps went backwards',
+        repeated and f'{repeated} stamps came twice',
         lost and f'{lost} messages were lost in transport; {LOSS_REMEDY}',
     )

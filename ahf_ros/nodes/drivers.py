@@ -7,7 +7,9 @@ docs/rig.md and the tests read them here.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+
+from ahf_ros.nodes.patience import CONTINUOUS, TRIGGERED
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,6 +35,32 @@ class Driver:
     settings: Mapping[str, float] = field(default_factory=dict)  # of the node, beside cloud
     calibrated: bool = True  # whether it publishes camera_info, beside the image
     pose: Mapping[str, str] = field(default_factory=dict)  # settings of the node `pose`
+    acquisition: str = TRIGGERED
+    frames: Mapping[str, str] = field(
+        default_factory=dict
+    )  # its parameters that name them, with {}
+    remappings: Mapping[str, str] = field(default_factory=dict)  # of its topics
+
+    def within(self, namespace: str) -> Driver:
+        """Return the driver in a namespace: its topics, its node and its frames are there.
+
+        A topic whose name begins with a slash in its sources is remapped; others follow the node.
+        """
+        if not (space := namespace.strip('/')):
+            return self
+        topics = {it: f'/{space}{it}' for it in (self.image, self.points, self.camera_info) if it}
+        name = space.replace('/', '_')
+        return replace(
+            self,
+            image=topics[self.image],
+            points=topics[self.points],
+            node=f'/{space}{self.node or "/"}',
+            parameters={
+                **self.parameters,
+                **{key: form.format(name) for key, form in self.frames.items()},
+            },
+            remappings=topics,
+        )
 
     @property
     def camera_info(self) -> str:
@@ -56,6 +84,7 @@ DRIVERS = {
         cloud_first=True,
         executable='zivid_camera',
         parameters={'color_space': 'srgb'},
+        frames={'frame_id': '{}_optical_frame'},
         setup='linear images are dark; call `capture`: `capture_2d` has no cloud',
     ),
     'ensenso': Driver(
@@ -67,6 +96,7 @@ DRIVERS = {
         settings={'cloud_tolerance': 1e-5},
         pose={'camera_matrix': 'p'},  # k is the identity
         executable='ensenso_camera_node',
+        frames={'camera_frame': '{}_optical_frame'},
         setup='request rectified images and the point cloud together; with a disparity map '
         'offset, the cloud is narrower than the image by `cloud_offset_x`',
     ),
@@ -90,6 +120,8 @@ DRIVERS = {
         point_step=20,
         missing='0',
         stamps='those of one set of frames',
+        acquisition=CONTINUOUS,
+        frames={'camera_name': '{}'},
         executable='realsense2_camera_node',
         node='/camera/camera',
         parameters={
@@ -106,6 +138,7 @@ DRIVERS = {
         points='/phoxi/phoxi_camera/cloud',
         encoding='32FC1',
         calibrated=False,
+        acquisition=CONTINUOUS,
         missing='0',
         cloud_first=True,
         stamps='when each is published',

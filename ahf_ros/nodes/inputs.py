@@ -185,6 +185,8 @@ class Input:
 
     def _report(self) -> None:
         text = f'{self.name} is subscribed to as it is published, {qos_words(self.profile)}'
+        logger = self._node.get_logger()
         if self.profile.reliability == ReliabilityPolicy.BEST_EFFORT:
-            text += '; messages that get lost are not resent'
-        self._node.get_logger().warning(text)
+            logger.warning(f'{text}; messages that get lost are not resent')
+        else:
+            logger.info(text)

@@ -139,6 +139,7 @@ NODES = {
         usual=(
             *('expected_targets', 'expected_ids', 'detector', 'family', 'polarity', 'ahf'),
             *('max_duration', 'stack', 'queue', 'image_transport'),
+            *('image_timeout', 'acquisition', 'always'),
         ),
     ),
     'illumination': NodeInterface(

@@ -18,7 +18,8 @@ from launch_ros.actions import Node
 
 from ahf_ros.nodes.drivers import Driver, beside
 from ahf_ros.nodes.interfaces import NODES
-from ahf_ros.nodes.topics import LOSSLESS_SUBSCRIPTION, SUBSCRIPTION
+from ahf_ros.nodes.settings import RegistrationNodeSettings
+from ahf_ros.nodes.topics import LOSSLESS_SUBSCRIPTION, POINTS, SUBSCRIPTION
 from ahf_ros.settings.nested import flat_parameters
 from ahf_ros.settings.parameter import Parameter
 
@@ -28,7 +29,7 @@ USUAL = NODES['detector'].usual
 OF_POSE = ('coordinates', 'unit', 'tf', 'camera_matrix')
 """Parameters of the node `pose` that are arguments of `rig.launch.py`."""
 
-OF_REGISTRATION = ('frame', 'coordinates', 'unit', 'folder', 'cloud_tolerance')
+OF_REGISTRATION = ('frame', 'coordinates', 'unit', 'folder', 'cloud_tolerance', 'scanners')
 """Likewise of `registration`."""
 
 _SIM_TIME = Parameter('use_sim_time', False, 'Whether to take the time from /clock.')
@@ -66,7 +67,9 @@ def arguments(names: Iterable[str]) -> list[DeclareLaunchArgument]:
     An argument that is not given is empty, and the parameter file decides.
     """
     namespace = DeclareLaunchArgument(
-        'namespace', default_value='', description='Namespace of the nodes, such as left.'
+        'namespace',
+        default_value='',
+        description='Namespace of the nodes, and of the topics of a driver, such as left.',
     )
     items = [_item('detector', name) for name in (*names, _SIM_TIME.name)]
     return [namespace, parameter_file('detector'), *map(_argument, items)]
@@ -97,7 +100,8 @@ def arguments_of_poses() -> list[DeclareLaunchArgument]:
         )
     )
     items = (_item('pose', name) for name in OF_POSE)
-    made += [*map(_argument, items), _argument(_item('registration', 'folder'))]
+    made += map(_argument, items)
+    made += [_argument(_item('registration', name)) for name in ('folder', 'scanners')]
     return [*made, *(parameter_file(node, f'{node}_parameters') for node in nodes)]
 
 
@@ -107,6 +111,14 @@ def parameter_file(node: str, name: str = 'parameters') -> DeclareLaunchArgument
         name,
         default_value=config(f'{node}.yaml'),
         description=f'Parameter file of the node {node}; arguments take precedence over it.',
+    )
+
+
+def default_argument(node: str, name: str) -> DeclareLaunchArgument:
+    """Return the launch argument for a parameter where no parameter file decides."""
+    item = _item(node, name)
+    return DeclareLaunchArgument(
+        name, default_value=str(item.default), description=item.description
     )
 
 
@@ -144,7 +156,9 @@ def detector(given: Mapping[str, str], names: Iterable[str], driver: Driver | No
     and what is accepted, if a value is not.
     """
     image, points = _topics(given, driver)
-    values: dict[str, Any] = {'cloud': True, **driver.settings} if driver else {}
+    values: dict[str, Any] = {}
+    if driver:
+        values = {'cloud': True, 'acquisition': driver.acquisition, **driver.settings}
     values |= _values('detector', names, given)
     whatever_queue = SUBSCRIPTION, LOSSLESS_SUBSCRIPTION
     values |= _best_effort(given, driver, (image, points), whatever_queue)
@@ -166,6 +180,8 @@ def pose(given: Mapping[str, str], driver: Driver) -> Node:
         )
     image, _ = _topics(given, driver)
     values = {'targets_frame': given['frame'], **driver.pose, **_values('pose', OF_POSE, given)}
+    if timeout := given['image_timeout']:
+        values['targets_timeout'] = _item('pose', 'targets_timeout').value_of(timeout)
     topics = {'camera_info': camera_info or beside(image)}
     return _node('pose', given, given['pose_parameters'], values, topics)
 
@@ -175,19 +191,26 @@ def registration(given: Mapping[str, str], driver: Driver) -> Node:
 
     Raises a ValueError as `detector` does.
     """
-    _, points = _topics(given, driver)
     tolerance = driver.settings.get('cloud_tolerance')
     values: dict[str, Any] = {'cloud': True}
     values |= {'cloud_tolerance': tolerance} if tolerance else {}
+    if given['scanners']:
+        names = RegistrationNodeSettings(scanners=given['scanners']).scanner_names
+        given = {**given, 'namespace': ''}  # all of them are read from outside
+        topics = clouds = {f'{it}/{POINTS}': driver.within(it).points for it in names}
+    else:
+        clouds = {POINTS: _topics(given, driver)[1]}
+        topics = {'target_points': 'detector/target_points', **clouds}
+        if space := given['namespace'].strip('/'):
+            values['scan_frame'] = f'{space.replace("/", "_")}_scan_'
     values |= _values('registration', OF_REGISTRATION, given)
-    values |= _best_effort(given, driver, (points,), (LOSSLESS_SUBSCRIPTION,))
-    topics = {'target_points': 'detector/target_points', 'points': points}
+    values |= _best_effort(given, driver, clouds.values(), (LOSSLESS_SUBSCRIPTION,))
     return _node('registration', given, given['registration_parameters'], values, topics)
 
 
 def without_effect(given: Mapping[str, str]) -> list[LogInfo]:
     """Return what says of arguments that no node is started that has them."""
-    users: dict[str, tuple[str, ...]] = {'folder': ('registration',)}
+    users: dict[str, tuple[str, ...]] = dict.fromkeys(('folder', 'scanners'), ('registration',))
     users |= dict.fromkeys((*OF_POSE, 'camera_info'), ('pose',))
     users |= dict.fromkeys(('coordinates', 'unit'), ('pose', 'registration'))
     return [
@@ -200,6 +223,7 @@ def without_effect(given: Mapping[str, str]) -> list[LogInfo]:
 def _topics(given: Mapping[str, str], driver: Driver | None) -> tuple[str, str]:
     image, points = given.get('image', ''), given.get('points', '')
     if driver:
+        driver = driver.within(given['namespace'])
         return image or driver.image, points or driver.points
     return image, points
 
@@ -237,9 +261,13 @@ def _node(
 
 
 def driver_node(
-    driver: Driver, package: str = '', executable: str = '', parameters: str = ''
+    driver: Driver,
+    namespace: str = '',
+    package: str = '',
+    executable: str = '',
+    parameters: str = '',
 ) -> Node:
-    """Return the node of a driver, whose end ends the launch.
+    """Return the node of a driver in a namespace, whose end ends the launch.
 
     Package and executable are those of the driver where they are empty; `parameters` is a file
     that takes precedence over what the driver needs here. Raises a ValueError if the driver is not
@@ -259,6 +287,7 @@ def driver_node(
             f'driver_package is {package}, which is not installed or not sourced, accepted is an '
             f'installed package; {without}'
         ) from error
+    driver = driver.within(namespace)
     space, _, name = driver.node.rpartition('/')
     return Node(
         package=package,
@@ -266,6 +295,7 @@ def driver_node(
         namespace=space or None,
         name=name or None,
         parameters=[it for it in (dict(driver.parameters), parameters) if it],
+        remappings=list(driver.remappings.items()),
         output='screen',
         on_exit=Shutdown(reason='the driver has ended'),
     )

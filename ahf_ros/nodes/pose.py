@@ -35,7 +35,7 @@ from ahf_ros.nodes.settings import CAMERA, NONE, PoseNodeSettings
 from ahf_ros.nodes.tf import Frames
 from ahf_ros.nodes.topics import ANSWERS_KEPT, DETECTIONS
 from ahf_ros.nodes.undistortion import Calibrations
-from ahf_ros.nodes.watch import other_types, silence, topics_of_others
+from ahf_ros.nodes.watch import Expected, Silence, other_types, silence, topics_of_others
 from ahf_ros.orientation.points import blocks
 from ahf_ros.orientation.pose import Pose
 from ahf_ros.orientation.single_image import (
@@ -75,6 +75,7 @@ class PoseNode(ProcessNode):
             self._detections = kinds, publisher
         wanted = settings.tf != NONE or settings.target_frames
         self._frames = Frames(self) if wanted else None
+        self._silence = Silence(self, 'coded_targets')
         publish_status(self, 'pose', self._status)
         self._informed = False
         self._camera_info = self.subscribe(
@@ -249,12 +250,9 @@ class PoseNode(ProcessNode):
         publishers = source.publishers()
         tally.mistaken = other_types(source, publishers)
         tally.lost += source.losses.newly_lost()
-        silent = time.monotonic() - source.arrived
-        timeout = self._settings.current.targets_timeout
-        tally.silent = ''
-        if timeout and silent > timeout:
-            why = silence(source, publishers, topics)
-            tally.silent = f'no coded_targets for {silent:.0f} s: {why}'
+        # The detector says whether images come, of which each gives a message.
+        expected = Expected(self._settings.current.targets_timeout)
+        tally.silent = self._silence.look(source, publishers, expected)
         tally.uncalibrated = ''
         if tally.received and not self._informed:
             source = self._camera_info

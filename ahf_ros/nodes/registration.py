@@ -9,10 +9,10 @@ from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
+from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticStatus
 from geometry_msgs.msg import PoseWithCovarianceStamped
-from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
-from rclpy.time import Time
+from rclpy.callback_groups import CallbackGroup, MutuallyExclusiveCallbackGroup
 from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import Header
 from std_srvs.srv import Trigger
@@ -22,6 +22,7 @@ from ahf_ros.interchange.matching import ANSWER, ANSWERS, CLOUD, WAITING_MEMORY,
 from ahf_ros.interchange.point_clouds import whole_points
 from ahf_ros.interchange.registration_files import ScanRecord, in_common_frame, write_registration
 from ahf_ros.nodes.diagnostics import publish_status, status_of
+from ahf_ros.nodes.inputs import Input
 from ahf_ros.nodes.messages import (
     cloud_message,
     field_points,
@@ -30,10 +31,12 @@ from ahf_ros.nodes.messages import (
     transform_message,
 )
 from ahf_ros.nodes.parameters import ParameterSettings
+from ahf_ros.nodes.patience import SECONDS
 from ahf_ros.nodes.process import LOG_PERIOD, ProcessNode
 from ahf_ros.nodes.settings import RegistrationNodeSettings
 from ahf_ros.nodes.tf import PACKAGE, Frames
 from ahf_ros.nodes.topics import ANSWERS_KEPT, POINTS
+from ahf_ros.nodes.watch import Expected, Silence
 from ahf_ros.scans import Scans, known_targets, scan_cloud
 from ahf_ros.text import counted, printable
 
@@ -43,6 +46,9 @@ _NO_TF = (
 )
 
 _MILLIMETRES = 1000.0
+
+MAXIMUM_SECONDS = 2**31 - 1
+"""Of a stamp; nanoseconds beyond a second may lead past it."""
 
 
 @dataclass(slots=True)
@@ -83,16 +89,12 @@ class RegistrationNode(ProcessNode):
         elif settings.tf:
             self.get_logger().warning(_NO_TF)
         self._unmatched = [0, 0]  # clouds, and scans
-        tolerance = round(settings.cloud_tolerance * 1e9)
-        self._matcher = Matcher(tolerance, (WAITING_MEMORY, ANSWERS), self._unmatched)
-        self._inputs_of_scans = [
-            self.subscribe(PointCloud2, 'target_points', self._on_scan, group, lossless=True)
-        ]
+        self._sources: dict[Input, Silence] = {}  # of target points
+        self._inputs_of_scans: list[Input] = []
         if settings.cloud:
             self._cloud = self.publisher(PointCloud2, '~/cloud', 10)
-            self._inputs_of_scans.append(
-                self.subscribe(PointCloud2, POINTS, self._on_cloud, group, lossless=True)
-            )
+        for scanner in settings.scanner_names:
+            self._listen_to(scanner, settings, group)
         for name, work in (
             ('save', self._save),
             ('undo', self._undo),
@@ -102,6 +104,25 @@ class RegistrationNode(ProcessNode):
             respond = partial(self._respond, work)
             self.create_service(Trigger, f'~/{name}', respond, callback_group=group)
         publish_status(self, 'registration', self._status)
+
+    def _listen_to(
+        self, scanner: str, settings: RegistrationNodeSettings, group: CallbackGroup
+    ) -> None:
+        """Subscribe to the target points and clouds of a scanner; its name may be empty."""
+        targets, clouds = 'target_points', POINTS
+        if scanner:
+            targets, clouds = f'{scanner}/detector/target_points', f'{scanner}/{POINTS}'
+        tolerance = round(settings.cloud_tolerance * 1e9)
+        matcher = Matcher(tolerance, (WAITING_MEMORY, ANSWERS), self._unmatched)
+        on_scan = partial(self._on_scan, scanner, matcher)
+        source = self.subscribe(PointCloud2, targets, on_scan, group, lossless=True)
+        self._sources[source] = Silence(self, 'target points')
+        self._inputs_of_scans.append(source)
+        if settings.cloud:
+            on_cloud = partial(self._on_cloud, matcher)
+            self._inputs_of_scans.append(
+                self.subscribe(PointCloud2, clouds, on_cloud, group, lossless=True)
+            )
 
     def introduction(self) -> str:
         """Return what is registered where."""
@@ -113,12 +134,12 @@ class RegistrationNode(ProcessNode):
             names
         )
 
-    def _on_scan(self, message: PointCloud2) -> None:
+    def _on_scan(self, scanner: str, matcher: Matcher, message: PointCloud2) -> None:
         self._tally.received += 1
         stamp = nanoseconds(message.header)
         record = ScanRecord('')  # of a refused scan, whose cloud is given up, too
         try:
-            self._register(message, stamp)
+            self._register(message, stamp, scanner)
         except ValueError as error:
             self._tally.refused += 1
             self._tally.reason = printable(str(error), 1000)
@@ -130,21 +151,21 @@ class RegistrationNode(ProcessNode):
             self._publish(len(self._registration.records) - 1)
             self._publish_all()
         if self._settings.current.cloud:
-            cloud = self._matcher.put(ANSWER, stamp, record)
+            cloud = matcher.put(ANSWER, stamp, record)
             if cloud is not None:
                 self._take(record, cloud)
 
-    def _register(self, message: PointCloud2, stamp: int) -> None:
+    def _register(self, message: PointCloud2, stamp: int, scanner: str) -> None:
         """Register a scan, or raise a ValueError that says why not."""
         settings, count = self._settings.current, len(self._registration.records)
         if count >= settings.maximum_scans:
             raise ValueError(f'{count} scans are registered, accepted is maximum_scans')
         frame_id = message.header.frame_id
         confidence = settings.minimum_confidence
-        self._registration.register(whole_points(message), confidence, stamp, frame_id)
+        self._registration.register(whole_points(message), confidence, stamp, frame_id, scanner)
 
-    def _on_cloud(self, cloud: PointCloud2) -> None:
-        record = self._matcher.put(CLOUD, nanoseconds(cloud.header), cloud, len(cloud.data))
+    def _on_cloud(self, matcher: Matcher, cloud: PointCloud2) -> None:
+        record = matcher.put(CLOUD, nanoseconds(cloud.header), cloud, len(cloud.data))
         if record is not None:
             self._take(record, cloud)
 
@@ -179,7 +200,8 @@ class RegistrationNode(ProcessNode):
         )
 
     def _header(self, record: ScanRecord) -> Header:
-        stamp = Time(nanoseconds=record.stamp).to_msg()
+        seconds, rest = divmod(record.stamp, 10**9)
+        stamp = Time(sec=min(seconds, MAXIMUM_SECONDS), nanosec=rest)
         return Header(stamp=stamp, frame_id=self._settings.current.frame)
 
     def _publish(self, number: int) -> None:
@@ -255,10 +277,10 @@ class RegistrationNode(ProcessNode):
         tally, told = self._tally, self._told
         for it in self._inputs_of_scans:
             tally.lost += it.losses.newly_lost()
-        source = self._inputs_of_scans[0]
-        silent = not (tally.received or source.publishers())
+        expected = Expected(SECONDS)  # each scan is triggered
+        silent = [it.look(of, of.publishers(), expected) for of, it in self._sources.items()]
         reports = (
-            silent and f'nobody publishes {source.name}: remap with -r target_points:=...',
+            *silent,
             tally.refused > told.refused
             and f'{tally.refused - told.refused} scans refused: {tally.reason}',
             tally.clouds_refused > told.clouds_refused and f'cloud refused: {tally.cloud_reason}',

@@ -16,7 +16,7 @@ from ahf_ros.session import create_identifier
 from ahf_ros.session_settings import IdentificationSettings, StackSettings
 from ahf_ros.settings.parameter import check_parameters, parameter
 from ahf_ros.synthetic.scene import SceneSettings
-from ahf_ros.text import printable
+from ahf_ros.text import printable, shown
 
 LATEST, LOSSLESS = 'latest', 'lossless'
 """What becomes of images that arrive while another one is being identified."""
@@ -32,6 +32,8 @@ _SERVICE_NAME = re.compile(r'[~/]?/?[A-Za-z_]\w*(/[A-Za-z_]\w*)*', re.ASCII)
 
 NONE, CAMERA, TARGETS = 'none', 'camera', 'targets'
 """Which frame is the parent in tf."""
+
+_NAMESPACE = re.compile(r'[A-Za-z_]\w*(/[A-Za-z_]\w*)*', re.ASCII)
 
 _FRAME = re.compile(r'[^\s/][^\s]*')
 
@@ -244,6 +246,13 @@ class ScoreboardSettings:
 class RegistrationNodeSettings(RegistrationSettings):
     """Settings of the node `registration`: also what is published, kept and written."""
 
+    scanners: str = parameter(
+        '',
+        'Namespaces of scanners whose scans are registered together, such as left,right: the '
+        'topics are then left/detector/target_points and left/points, and so on.',
+        form='names with commas between them, or nothing',
+        read_only=True,
+    )
     scan_frame: str = parameter(
         'scan_',
         'Beginning of the names of the frames of the scans: the first one is scan_1.',
@@ -281,6 +290,17 @@ class RegistrationNodeSettings(RegistrationSettings):
         """Refuse values that are not accepted."""
         RegistrationSettings.__post_init__(self)
         check_frame('scan_frame', self.scan_frame)
+        names = self.scanner_names
+        if self.scanners and not all(map(_NAMESPACE.fullmatch, names)):
+            accepted = 'names of namespaces with commas between them, such as left,right'
+            raise ValueError(f'scanners is {shown(self.scanners)}, accepted are {accepted}')
+        if len(set(names)) < len(names):
+            raise ValueError(f'scanners is {shown(self.scanners)}, accepted is each name once')
+
+    @property
+    def scanner_names(self) -> tuple[str, ...]:
+        """Names of the scanners without slashes at their ends; one is empty if none is named."""
+        return tuple(it.strip().strip('/') for it in self.scanners.split(','))
 
 
 @dataclass(frozen=True, slots=True)
@@ -333,7 +353,8 @@ class PoseNodeSettings:
     )
     targets_timeout: float = parameter(
         10.0,
-        'Time without coded_targets after which the diagnostics warn and say why, s; 0: never.',
+        'Time without a publisher of coded_targets that is received, after which the diagnostics '
+        'warn and say why, s; 0: never.',
         minimum=0.0,
         maximum=86400.0,
     )

@@ -55,7 +55,7 @@ def test_every_panel_has_a_place_and_settings() -> None:
 
 
 def test_the_node_has_what_the_layout_shows(graph: Any) -> None:
-    graph.start('detector', '-p', 'cloud:=true')
+    graph.start('detector', '-p', 'cloud:=true', '-p', 'always:=true')
     diagnostics = graph.listen(DiagnosticArray, '/diagnostics')
     graph.until(lambda: diagnostics)
     node = ('detector', '/')

@@ -22,7 +22,7 @@ from ahf_ros.nodes.messages import image_message
 from ahf_ros.nodes.process import JoiningExecutor
 from ahf_ros.nodes.start import NODES
 from support import live, packages
-from support.detector import DetectorProcess
+from support.detector import DetectorProcess, overrides
 
 SIGNALLED = """
 import os, signal, sys
@@ -127,7 +127,7 @@ def test_the_end_does_not_wait_for_a_detector_of_another_package(
     mark = tmp_path / 'mark'
     packages.write_package(tmp_path, 'hanging', packages.SLOW.format(fast=0, mark=str(mark)))
     monkeypatch.setenv('PYTHONPATH', f'{tmp_path}{os.pathsep}{os.environ.get("PYTHONPATH", "")}')
-    given = ('-p', 'detector:=mine', '-p', 'detector_timeout:=600.0')
+    given = overrides(detector='mine', detector_timeout=600.0, always='true')
     node = graph.start('detector', '-r', '__ns:=/hanging', *given)
     image = graph.publisher(Image, '/hanging/image')
     image.publish(image_message(np.tile(np.arange(40, dtype=np.uint8), (30, 1)), Header()))
