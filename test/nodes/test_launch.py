@@ -30,7 +30,7 @@ DETECTOR_FILE, POSE_FILE, REGISTRATION_FILE = (
     str(ROOT / 'config' / f'{name}.yaml') for name in ('detector', 'pose', 'registration')
 )
 BEST_EFFORT = (
-    'qos_overrides./phoxi/phoxi_camera/cloud.subscription_lossless.reliability:=best_effort'
+    'qos_overrides./left/phoxi/phoxi_camera/cloud.subscription_lossless.reliability:=best_effort'
 )
 
 
@@ -195,7 +195,7 @@ def test_the_rig_registers_scans_and_knows_its_pose() -> None:
     for driver, camera_info, of_pose, of_registration in (
         (
             'ensenso',
-            '/rectified/left/camera_info',
+            '/left/rectified/left/camera_info',
             ['camera_matrix:=p'],
             ['cloud_tolerance:=1e-05'],
         ),
@@ -211,7 +211,8 @@ def test_the_rig_registers_scans_and_knows_its_pose() -> None:
         assert options(registration) == {
             *('__ns:=/left', 'frame:=registered', 'cloud:=true', *common, *of_registration),
             *(REGISTRATION_FILE, 'target_points:=detector/target_points'),
-            f'points:={DRIVERS[driver].points}',
+            f'points:=/left{DRIVERS[driver].points}',
+            'scan_frame:=left_scan_',
         }
 
 

@@ -92,7 +92,9 @@ def test_all_of_many_requests_at_once_are_answered(graph: Any) -> None:
 def test_the_policy_allows_what_a_node_has(graph: Any) -> None:
     graph.start(
         'detector',
-        *overrides(**dict.fromkeys(('cloud', 'undistort', 'managed', 'autostart'), 'true')),
+        *overrides(
+            **dict.fromkeys(('cloud', 'undistort', 'managed', 'autostart', 'always'), 'true')
+        ),
     )
     own, node = ('detector', '/'), graph.node
     graph.until(
