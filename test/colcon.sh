@@ -40,7 +40,8 @@ print(of['jazzy']['build'], of['jazzy']['run'])")
 fi
 
 underlay=$AMENT_PREFIX_PATH
-colcon build --base-paths src --cmake-args -DBUILD_TESTING=ON "-DPython3_EXECUTABLE=$(command -v python3)"
+colcon build --base-paths src --cmake-args -DBUILD_TESTING=ON -DAHF_ROS_ALL_TESTS=ON \
+    "-DPython3_EXECUTABLE=$(command -v python3)"
 . install/setup.sh
 export AMENT_PREFIX_PATH="$AMENT_PREFIX_PATH:$underlay"
 colcon test --base-paths src --event-handlers console_cohesion+

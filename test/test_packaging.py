@@ -37,9 +37,12 @@ Kilted are for. Looked up in the rules of ros/rosdistro of 2026-08-22, commit 84
 
 RELEASED = {
     'ament_cmake',
+    'ament_cmake_lint_cmake',
     'ament_cmake_pytest',
     'ament_cmake_python',
+    'ament_cmake_xmllint',
     'ament_index_python',
+    'ament_lint_auto',
     'builtin_interfaces',
     'diagnostic_msgs',
     'geometry_msgs',
@@ -95,6 +98,16 @@ def test_that_is_what_the_rules_of_rosdep_say() -> None:
             if release := entry.get('release'):
                 released |= set(release.get('packages', [repository]))
         assert RELEASED - released == set()
+
+
+def test_who_uses_the_messages_need_not_install_what_commands_need() -> None:
+    conditions = {it.text: it.get('condition') for it in PACKAGE.iter('exec_depend')}
+    of_commands = {key for key, condition in conditions.items() if condition}
+    assert of_commands == {
+        *('python3-argcomplete', 'python3-jinja2', 'python3-pil', 'python3-reportlab'),
+        *('python3-scipy', 'python3-sklearn'),
+    }
+    assert {conditions[key] for key in of_commands} == {'$AHF_ROS_COMMANDS == 1'}
 
 
 def test_the_recipe_for_conda_has_the_dependencies_of_the_package() -> None:

@@ -33,7 +33,7 @@ parameters that are changed most:
 all parameters, while the node runs:
   ros2 param list /{node}
   ros2 param describe /{node} NAME
-or docs/parameters.md, and the files in config/.
+{more}
 """
 
 
@@ -55,6 +55,7 @@ class NodeInterface:
     interfaces: tuple[Interface, ...]
     settings: type
     usual: tuple[str, ...]  # names of the parameters that are changed most
+    more: str  # where all of them are described
 
 
 def _interfaces(table: str) -> tuple[Interface, ...]:
@@ -67,7 +68,7 @@ _DETECTOR = _interfaces("""
 in image sensor_msgs/Image \
     mono, colour, Bayer, YUV422; 8 and 16 bits and floats; any step and byte order
 in image/compressed sensor_msgs/CompressedImage \
-    with `image_transport` compressed: JPEG, PNG of 8 and 16 bits
+    with `image_transport` compressed: JPEG, WebP, PNG of 8 and 16 bits
 in camera_info sensor_msgs/CameraInfo with `undistort`
 in points sensor_msgs/PointCloud2 with `cloud`: organised, one point per pixel
 out coded_targets ahf_ros/CodedTargetArray one for every image, even if it is empty
@@ -84,7 +85,8 @@ out ~/annotations visualization_msgs/ImageMarker \
     outlines to lay over the image; only while somebody subscribes
 out /diagnostics diagnostic_msgs/DiagnosticArray once per second
 service ~/identify ahf_ros/srv/Identify one image, one answer, never dropped
-service ~/reset std_srvs/Trigger forget the filter of earlier images
+service ~/reset std_srvs/Trigger \
+    forget what earlier images showed: filter, N that was estimated, families that were settled
 service ~/change_state lifecycle_msgs/ChangeState \
     with `managed`, as the other services of the lifecycle
 """)
@@ -122,7 +124,7 @@ out /tf_static tf2_msgs/TFMessage with `tf`: the frames of all scans
 out /diagnostics diagnostic_msgs/DiagnosticArray once per second
 service ~/save std_srvs/Trigger write clouds, transforms and targets to `folder`
 service ~/undo std_srvs/Trigger take back the last scan or adjustment
-service ~/reset std_srvs/Trigger forget all scans
+service ~/reset std_srvs/Trigger forget all scans and their clouds; known coordinates stay
 service ~/adjust std_srvs/Trigger adjust all scans and targets jointly
 """)
 
@@ -141,6 +143,7 @@ NODES = {
             *('max_duration', 'stack', 'queue', 'image_transport'),
             *('image_timeout', 'acquisition', 'always'),
         ),
+        more='docs/parameters.md and config/detector.yaml',
     ),
     'illumination': NodeInterface(
         purpose=(
@@ -149,24 +152,28 @@ NODES = {
         interfaces=_ILLUMINATION,
         settings=IlluminationNodeSettings,
         usual=('light', 'ambient', 'targets', 'width', 'height', 'dot_radius', 'rate', 'seed'),
+        more='config/illumination.yaml',
     ),
     'pose': NodeInterface(
         purpose='Computes the pose of the camera from identified targets of known coordinates.',
         interfaces=_POSE,
         settings=PoseNodeSettings,
         usual=('coordinates', 'unit', 'tf', 'targets_frame', 'camera_matrix', 'target_frames'),
+        more='docs/pose.md and config/pose.yaml',
     ),
     'registration': NodeInterface(
         purpose='Registers scans in one frame by the targets that they have in common.',
         interfaces=_REGISTRATION,
         settings=RegistrationNodeSettings,
         usual=('frame', 'coordinates', 'unit', 'cloud', 'cloud_tolerance', 'folder'),
+        more='docs/registration.md and config/registration.yaml',
     ),
     'scoreboard': NodeInterface(
         purpose='Compares answers with the truth and prints one line per image.',
         interfaces=_SCOREBOARD,
         settings=ScoreboardSettings,
         usual=('images',),
+        more='the line above: there are no others',
     ),
 }
 
@@ -188,6 +195,7 @@ def help_text(node: str) -> str:
         purpose=about.purpose,
         interfaces=_columns(rows),
         parameters=_columns(settings),
+        more=f'or {about.more}',
     )
 
 

@@ -40,6 +40,7 @@ def start(node: str, arguments: list[str] | None = None) -> int:
     """
     global _status
     signalled()
+    os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')  # before numpy is loaded; see ahf_ros.blas
     atexit.register(_leave_threads)  # before all others, so that it is called last
     own = sys.argv[1:] if arguments is None else arguments
     if '--ros-args' in own:
