@@ -35,7 +35,12 @@ def change(graph: Any, node: str, transition: int) -> bool:
 @pytest.mark.lasting
 def test_a_managed_node_goes_through_its_states(graph: Any) -> None:
     node, topic = '/managed/detector', '/managed/image'
-    graph.start('detector', '-r', '__ns:=/auto', *overrides(managed='true', autostart='true'))
+    graph.start(
+        'detector',
+        '-r',
+        '__ns:=/auto',
+        *overrides(managed='true', autostart='true', always='true'),
+    )
     wrong = {'min_radius': 70, 'max_radius': 60}
     given = overrides(managed='true', queue='lossless', family='metashape12', **wrong)
     detector = DetectorProcess(graph, '/managed', *given, subscribed=False)

@@ -122,7 +122,7 @@ def test_stamps_that_go_backwards_are_told_and_answered(graph: Any, pixels: np.n
     assert bench.told('rejected') == '0'
     warned = [it.status[0] for it in bench.diagnostics if it.status[0].level != b'\0']
     assert [(it.level, it.message) for it in warned] == [
-        (DiagnosticStatus.WARN, '1 stamps went backwards')
+        (DiagnosticStatus.WARN, '1 stamps went backwards; 1 stamps came twice')
     ]
     status, log = bench.process.end()
     assert status == 0
