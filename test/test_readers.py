@@ -51,6 +51,7 @@ MAY_OPEN = {
     'detectors/external/command.py': 'what a program printed',
     'features/logistic.py': 'weights of the package',
     'nodes/process.py': 'no files',
+    'nodes/processes.py': 'what the system says of processes',
     'report/page.py': 'parts of the page',
 }
 """Modules that may open something else than what a user names, and what."""
