@@ -59,6 +59,10 @@ class Answers:
         if self._undistorted:
             self._undistorted.listen(settings.answers.undistort)
 
+    def give_up(self, message: CodedTargetArray) -> None:
+        """Publish that an image was not identified, to those who wait for its stamp."""
+        self._targets.publish(message)
+
     def waiting(self) -> tuple[Input, Waiting] | None:
         """Return where clouds come from and what waits for its match, None without clouds."""
         clouds = self._clouds
@@ -82,6 +86,7 @@ class Answers:
         """
         message, found = pipeline.message(answer), answer.identification
         self._targets.publish(message)
+        self._tally.settled = answer.settled
         self._tally.answered += answer.fresh
         self._tally.latency = time.monotonic() - received
         self._tally.last = found

@@ -176,6 +176,7 @@ class DetectorNode(ProcessNode, LifecycleNodeMixin):
         self._stopping.set()
         ending.begin()
         self._worker.stop()
+        self._queue.give_up(STOPPING)
 
     def introduction(self) -> str:
         """Return the settings that matter most, and the topics."""

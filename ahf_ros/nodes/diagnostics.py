@@ -127,6 +127,7 @@ class Tally(Stamps):
     behind: int = 0  # images dropped since none last waited after an identification
     inactive: str = ''  # state of a managed node that is not active
     latency: float = 0.0  # from the arrival of the last image to its answer, s
+    settled: tuple[str, ...] = ()  # families, where all are looked for
     last: Identification = field(default_factory=lambda: Identification(()))
     clouds: CloudTally | None = None  # None while they are not subscribed to
 
@@ -194,6 +195,7 @@ class Diagnostics:
             'expected (N)': tally.last.expected,
             'N estimated': tally.last.estimated,
             'mirrored': tally.last.mirrored,
+            'settled families': ', '.join(tally.settled),
             'edge shift (px)': '' if shift is None else f'{shift:.2f}',
             'advice': tally.advice,
             'filter applied': used.applied,
