@@ -92,6 +92,16 @@ def identification_from(message: Any) -> Identification:
     )
 
 
+def has_corners(message: Any) -> bool:
+    """Return whether a CodedTarget is a square marker.
+
+    In bags that are older than these fields it has none, and where a program of others left them
+    as they were, all of them are zero.
+    """
+    corners = np.reshape(getattr(message, 'corners', (math.nan, math.nan)), (-1, 2))
+    return bool(np.isfinite(corners).all() and np.ptp(corners, axis=0).all())
+
+
 def _values(target: Target) -> dict[str, Any]:
     """Return the fields of the message of a target."""
     values = {name: getattr(target, name) for name in _TARGET_FIELDS}
@@ -115,10 +125,10 @@ def _target(message: Any) -> Target:
     """Return the target of a message, a `SquareMarker` where it has corners."""
     values = {name: getattr(message, name) for name in _TARGET_FIELDS}
     values['covariance'] = tuple(message.covariance.tolist())
-    corners = np.reshape(getattr(message, 'corners', math.nan), (-1, 2))
-    if not np.isfinite(corners).all():
+    if not has_corners(message):
         return Target(**values)
-    turned = dict(zip(corner_order(message.family), map(tuple, corners.tolist()), strict=True))
+    corners = map(tuple, message.corners.reshape(4, 2).tolist())
+    turned = dict(zip(corner_order(message.family), corners, strict=True))
     hamming, margin = message.hamming, message.decision_margin
     return SquareMarker(
         **values,

@@ -70,8 +70,10 @@ in image/compressed sensor_msgs/CompressedImage \
     with `image_transport` compressed: JPEG, PNG of 8 and 16 bits
 in camera_info sensor_msgs/CameraInfo with `undistort`
 in points sensor_msgs/PointCloud2 with `cloud`: organised, one point per pixel
-out coded_targets ahf_ros/CodedTargetArray one for every image, even if it is empty
+out coded_targets ahf_ros/CodedTargetArray one for every image, even if it is empty, refused or dropped
 out ~/detections vision_msgs/Detection2DArray with `detections`
+out ~/apriltag_detections apriltag_msgs/AprilTagDetectionArray \
+    with `apriltag_detections`: square markers, as apriltag_ros publishes them
 out ~/undistorted_targets ahf_ros/CodedTargetArray with `undistort`: in the rectified image
 out ~/target_points sensor_msgs/PointCloud2 with `cloud`: position and ID of every target
 out ~/target_labels visualization_msgs/MarkerArray \
@@ -83,7 +85,8 @@ out ~/filtered_image sensor_msgs/Image \
 out ~/annotations visualization_msgs/ImageMarker \
     outlines to lay over the image; only while somebody subscribes
 out /diagnostics diagnostic_msgs/DiagnosticArray once per second
-service ~/identify ahf_ros/srv/Identify one image, one answer, never dropped
+service ~/identify ahf_ros/srv/Identify \
+    one image, one answer, never dropped; positions of its targets where a cloud is given
 service ~/reset std_srvs/Trigger forget the filter of earlier images
 service ~/change_state lifecycle_msgs/ChangeState \
     with `managed`, as the other services of the lifecycle

@@ -29,8 +29,10 @@ from sensor_msgs.msg import Image, PointCloud2, PointField
 from std_msgs.msg import ColorRGBA, Header
 from visualization_msgs.msg import ImageMarker, Marker, MarkerArray
 
+from ahf_ros.codes.square import library_name
 from ahf_ros.drawing.overlay import DECODED_COLOUR, DOUBTFUL_COLOUR, Colour
 from ahf_ros.interchange.point_clouds import AXES, COVARIANCE, NUMBERS
+from ahf_ros.interchange.target_messages import has_corners
 from ahf_ros.localisation import Positions, labelled
 from ahf_ros.msg import CodedTarget, CodedTargetArray
 from ahf_ros.orientation.transform import Transform
@@ -66,6 +68,37 @@ def target_detections(answer: CodedTargetArray, types: ModuleType) -> object:
             detection.results = [types.ObjectHypothesisWithPose(hypothesis=hypothesis)]
         detections.append(detection)
     return types.Detection2DArray(header=answer.header, detections=detections)
+
+
+def apriltag_detections(answer: CodedTargetArray, types: ModuleType) -> object:
+    """Return the square markers of an answer as apriltag_ros publishes them, in their order.
+
+    They are an `apriltag_msgs.msg.AprilTagDetectionArray` with the header of the answer; `types` is
+    the module `apriltag_msgs.msg`, version 2 or newer. A tag has the name that its own library
+    gives the family. Coordinates are those of the answer: the AprilTag library, for which (0, 0)
+    is a corner of the first pixel, has half a pixel more. Cells that nobody looked at count as
+    right, with a margin of 0.
+    """
+    detections = []
+    for target in answer.targets:
+        if target.id == UNDECODED or not has_corners(target):
+            continue
+        known = math.isfinite(target.hamming)
+        detections.append(
+            types.AprilTagDetection(
+                family=library_name(target.family),
+                id=target.id,
+                hamming=round(target.hamming) if known else 0,
+                goodness=0.0,
+                decision_margin=target.decision_margin if known else 0.0,
+                centre=types.Point(x=target.x, y=target.y),
+                corners=[
+                    types.Point(x=x, y=y) for x, y in target.corners.reshape(4, 2).tolist()
+                ],
+                homography=target.homography,
+            )
+        )
+    return types.AprilTagDetectionArray(header=answer.header, detections=detections)
 
 
 def target_annotations(answer: CodedTargetArray) -> ImageMarker:

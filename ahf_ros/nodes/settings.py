@@ -35,6 +35,10 @@ NONE, CAMERA, TARGETS = 'none', 'camera', 'targets'
 _FRAME = re.compile(r'[^\s/][^\s]*')
 
 
+PACKAGES = {'detections': 'vision_msgs', 'apriltag_detections': 'apriltag_msgs'}
+"""Which package has the messages that a setting asks for."""
+
+
 @dataclass(frozen=True, slots=True)
 class AnswerSettings:
     """Other forms in which answers are published, too."""
@@ -42,6 +46,11 @@ class AnswerSettings:
     detections: bool = parameter(
         False,
         'Whether to publish the targets on ~/detections, too, as vision_msgs/Detection2DArray.',
+    )
+    apriltag_detections: bool = parameter(
+        False,
+        'Whether to publish square markers on ~/apriltag_detections, too, as '
+        'apriltag_msgs/AprilTagDetectionArray.',
     )
     undistort: bool = parameter(
         False,
@@ -52,11 +61,12 @@ class AnswerSettings:
     def __post_init__(self) -> None:
         """Refuse values that are not accepted."""
         check_parameters(self)
-        if self.detections and find_spec('vision_msgs') is None:
-            raise ValueError(
-                'detections is True and the package vision_msgs is not there, accepted without '
-                'it is False; ros-DISTRIBUTION-vision-msgs installs it'
-            )
+        for name, package in PACKAGES.items():
+            if getattr(self, name) and find_spec(package) is None:
+                raise ValueError(
+                    f'{name} is True and the package {package} is not there, accepted without '
+                    f'it is False; ros-DISTRIBUTION-{package.replace("_", "-")} installs it'
+                )
 
 
 @dataclass(frozen=True, slots=True)

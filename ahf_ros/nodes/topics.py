@@ -30,7 +30,8 @@ CODED_TARGETS = 'coded_targets'
 POINTS, TARGET_POINTS, TARGET_LABELS = 'points', '~/target_points', '~/target_labels'
 """Clouds, and what their positions of targets are published on."""
 
-DETECTIONS, UNDISTORTED = '~/detections', '~/undistorted_targets'
+DETECTIONS, APRILTAG_DETECTIONS = '~/detections', '~/apriltag_detections'
+UNDISTORTED = '~/undistorted_targets'
 """Answers in other forms."""
 
 ANSWERS_KEPT = 1000
@@ -79,7 +80,7 @@ def declare_topics(node: Node) -> None:
     for topic in (*images, camera_info_topic(node), POINTS):
         for end in (SUBSCRIPTION, LOSSLESS_SUBSCRIPTION):
             declare_qos(node, end, topic, IMAGES_KEPT if topic in images else 1)
-    for topic in (TARGET_POINTS, DETECTIONS, UNDISTORTED):
+    for topic in (TARGET_POINTS, DETECTIONS, APRILTAG_DETECTIONS, UNDISTORTED):
         declare_qos(node, PUBLISHER, topic, ANSWERS_KEPT)
     declare_qos(node, PUBLISHER, TARGET_LABELS)
 
