@@ -258,9 +258,7 @@ class Stream(Generic[Item]):
                     yield Remark(Kind.SPLIT, split)
                 start, done = part.images.start, part.images.stop
                 fresh = done - max(start, first_fresh)
-                yield self._answer(
-                    frames[start:done], fresh, stack, found, incomplete, split
-                )
+                yield self._answer(frames[start:done], fresh, stack, found, incomplete, split)
         except Exception as error:
             yield why_failed(error, frames[done:])
 

@@ -307,7 +307,9 @@ class _Answering:
                 headers = (self._sent(message).header,)
         for header in headers:
             status, family = STATUS[remark.kind], self._family
-            yield self._output(topics, unanswered(status, remark.text, family, header, self._types))
+            yield self._output(
+                topics, unanswered(status, remark.text, family, header, self._types)
+            )
 
     def _output(self, topics: AnswerTopics, answer: Any) -> Output:
         return topics.targets, bytes(self._store.serialize_cdr(answer, CODED_TARGETS))

@@ -28,7 +28,7 @@ from ahf_ros.nodes.messages import (
 from ahf_ros.nodes.pipeline import Pipeline
 from ahf_ros.nodes.process import ProcessNode
 from ahf_ros.nodes.settings import PACKAGES, DetectorNodeSettings
-from ahf_ros.nodes.topics import APRILTAG_DETECTIONS, ANSWERS_KEPT, CODED_TARGETS, DETECTIONS
+from ahf_ros.nodes.topics import ANSWERS_KEPT, APRILTAG_DETECTIONS, CODED_TARGETS, DETECTIONS
 from ahf_ros.nodes.undistortion import UndistortedTargets
 from ahf_ros.stream import Answer
 

@@ -17,7 +17,9 @@ from rclpy.qos import QoSProfile
 from std_srvs.srv import Trigger
 
 from ahf_ros import ending
+from ahf_ros.interchange.point_clouds import organised_points
 from ahf_ros.nodes.answers import Answers
+from ahf_ros.nodes.cloud import points_of
 from ahf_ros.nodes.diagnostics import PERIOD, Diagnostics, Tally, publish_status
 from ahf_ros.nodes.image_queue import ImageQueue, Worker
 from ahf_ros.nodes.inputs import Input
@@ -254,8 +256,14 @@ class DetectorNode(ProcessNode, LifecycleNodeMixin):
         return response
 
     def _identify(self, request: Identify.Request, response: Identify.Response) -> None:
+        cloud, settings = request.cloud, self._settings.current.cloud
+        located = bool(cloud.width or len(cloud.data))
+        if located:
+            organised_points(cloud)
         job = partial(self._queue.identify, request.image, request.expected or None)
-        response.coded_targets = self._worker.call(job)
+        answer = response.coded_targets = self._worker.call(job)
+        if located:
+            response.target_points, _ = points_of(answer, cloud, settings)
 
     def _reset(self, request: Trigger.Request, response: Trigger.Response) -> None:
         self._worker.call(self._queue.pipeline.stream.reset)

@@ -70,7 +70,8 @@ in image/compressed sensor_msgs/CompressedImage \
     with `image_transport` compressed: JPEG, PNG of 8 and 16 bits
 in camera_info sensor_msgs/CameraInfo with `undistort`
 in points sensor_msgs/PointCloud2 with `cloud`: organised, one point per pixel
-out coded_targets ahf_ros/CodedTargetArray one for every image, even if it is empty, refused or dropped
+out coded_targets ahf_ros/CodedTargetArray \
+    one for every image, even if it is empty, refused or dropped
 out ~/detections vision_msgs/Detection2DArray with `detections`
 out ~/apriltag_detections apriltag_msgs/AprilTagDetectionArray \
     with `apriltag_detections`: square markers, as apriltag_ros publishes them

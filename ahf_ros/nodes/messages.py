@@ -73,8 +73,8 @@ def target_detections(answer: CodedTargetArray, types: ModuleType) -> object:
 def apriltag_detections(answer: CodedTargetArray, types: ModuleType) -> object:
     """Return the square markers of an answer as apriltag_ros publishes them, in their order.
 
-    They are an `apriltag_msgs.msg.AprilTagDetectionArray` with the header of the answer; `types` is
-    the module `apriltag_msgs.msg`, version 2 or newer. A tag has the name that its own library
+    They are an `apriltag_msgs.msg.AprilTagDetectionArray` with the header of the answer; `types`
+    is the module `apriltag_msgs.msg`, version 2 or newer. A tag has the name that its own library
     gives the family. Coordinates are those of the answer: the AprilTag library, for which (0, 0)
     is a corner of the first pixel, has half a pixel more. Cells that nobody looked at count as
     right, with a margin of 0.
@@ -92,9 +92,7 @@ def apriltag_detections(answer: CodedTargetArray, types: ModuleType) -> object:
                 goodness=0.0,
                 decision_margin=target.decision_margin if known else 0.0,
                 centre=types.Point(x=target.x, y=target.y),
-                corners=[
-                    types.Point(x=x, y=y) for x, y in target.corners.reshape(4, 2).tolist()
-                ],
+                corners=[types.Point(x=x, y=y) for x, y in target.corners.reshape(4, 2).tolist()],
                 homography=target.homography,
             )
         )

@@ -26,8 +26,8 @@ from ahf_ros.interchange.target_messages import coded_target_array
 from ahf_ros.localisation import Positions
 from ahf_ros.msg import CodedTarget, CodedTargetArray
 from ahf_ros.nodes.messages import (
-    apriltag_detections,
     PosedTarget,
+    apriltag_detections,
     detections_message,
     image_message,
     pose_message,

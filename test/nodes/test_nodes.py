@@ -92,7 +92,8 @@ def test_processes_identify_what_is_there_and_compare_it(graph: Any) -> None:
 
     def known() -> list[tuple[CodedTargetArray, CodedTargetArray]]:
         true = {stamp(it.header): it for it in truths}
-        return [(it, true[stamp(it.header)]) for it in answers if stamp(it.header) in true]
+        identified = [it for it in answers if it.status == CodedTargetArray.OK]
+        return [(it, true[stamp(it.header)]) for it in identified if stamp(it.header) in true]
 
     def both() -> bool:
         return len({truth.targets[0].id for _, truth in known()}) == 2  # two different images
@@ -136,7 +137,6 @@ def test_what_is_refused_is_counted_and_the_node_goes_on(
     flat = image_message(np.zeros((100, 100), np.uint8), header())
     short = image_message(np.zeros((100, 100), np.uint8), header())
     short.height = 200
-    refused: list[Header] = []
     for count, bad, error in (
         (1, Image(header=header(), encoding='8SC1', height=4, width=4), "encoding is '8SC1'"),
         (2, short, 'data has 10000 bytes, accepted are at least 20000'),
@@ -146,9 +146,41 @@ def test_what_is_refused_is_counted_and_the_node_goes_on(
         graph.until(lambda count=count: detector.told('rejected') == str(before + count))
         assert detector.told('last reason for rejection').startswith(error)
         assert detector.diagnostics[-1].status[0].name == 'own/detector: identification'
-        refused.append(bad.header)
-    assert len(detector.answer(message).targets) == SCENE['targets']
-    assert not [it for it in detector.targets if it.header in refused]
+        (answer,) = graph.until(lambda bad=bad: detector.answers_to(bad))
+        assert answer.status == CodedTargetArray.REJECTED
+        assert answer.reason.startswith(error)
+        assert (answer.targets, answer.width, answer.height) == ([], 0, 0)
+    answer = detector.answer(message)
+    assert len(answer.targets) == SCENE['targets']
+    assert (answer.status, answer.reason) == (CodedTargetArray.OK, '')
+
+
+def test_every_image_has_one_answer(graph: Any, detector: DetectorProcess, message: Image) -> None:
+    """As many as the subscription keeps come at once; others wait for the answer before."""
+    kinds = ['good', 'damaged', 'unknown'] * 3 + ['at once'] * 20 + ['good']
+    sent = []
+    for number, kind in enumerate(kinds):
+        image = image_message(np.frombuffer(message.data, np.uint8).reshape(700, 1000), header())
+        if kind == 'damaged':
+            image.data = image.data[:-1]
+        if kind == 'unknown':
+            image.encoding = 'mono9'
+        sent.append(image)
+        detector.images.publish(image)
+        if kinds[number : number + 2] != ['at once'] * 2:
+            graph.until(lambda: all(map(detector.answers_to, sent)))
+    answers = [detector.answers_to(it) for it in sent]
+    assert [len(it) for it in answers] == [1] * len(sent)
+    status = {kind: set() for kind in kinds}
+    for kind, (answer,) in zip(kinds, answers, strict=True):
+        status[kind].add(answer.status)
+        assert (answer.status == CodedTargetArray.OK) == (answer.reason == '')
+    dropped = {CodedTargetArray.DROPPED, CodedTargetArray.OK}
+    rejected = {CodedTargetArray.REJECTED}
+    assert status['good'] == {CodedTargetArray.OK}
+    assert status['damaged'] == status['unknown'] == rejected
+    assert status['at once'] <= dropped
+    assert answers[-2][0].status == CodedTargetArray.OK  # the latest of them
 
 
 def test_the_service_answers_one_image(detector: DetectorProcess, message: Image) -> None:
