@@ -188,7 +188,7 @@ def test_the_service_answers_one_image(detector: DetectorProcess, message: Image
     assert (response.success, response.message) == (True, '')
     assert response.coded_targets.header == message.header
     assert response.coded_targets.expected == 6
-    assert response.coded_targets.targets == detector.answer(message).targets
+    assert str(response.coded_targets.targets) == str(detector.answer(message).targets)  # has NaN
     message.encoding = 'jpeg'
     response = detector.identify(message)
     assert not response.success
