@@ -106,7 +106,8 @@ def _values(target: Target) -> dict[str, Any]:
     """Return the fields of the message of a target."""
     values = {name: getattr(target, name) for name in _TARGET_FIELDS}
     corners, homography = np.full(8, math.nan), np.full(9, math.nan)
-    hamming = margin = math.nan
+    hamming: float | None = None
+    margin: float | None = None
     if isinstance(target, SquareMarker):
         order = corner_order(target.family)
         corners = np.array([target.corners[it] for it in order], float).ravel()

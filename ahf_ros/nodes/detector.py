@@ -27,17 +27,24 @@ from ahf_ros.nodes.parameters import ParameterSettings
 from ahf_ros.nodes.pipeline import STOPPING, Pipeline
 from ahf_ros.nodes.process import ProcessNode
 from ahf_ros.nodes.service_detector import ServiceDetector
-from ahf_ros.nodes.settings import LOSSLESS, SERVICE, DetectorNodeSettings
+from ahf_ros.nodes.settings import (
+    FFMPEG,
+    IMAGE_TRANSPORTS,
+    LOSSLESS,
+    SERVICE,
+    DetectorNodeSettings,
+)
 from ahf_ros.nodes.topics import (
     CODED_TARGETS,
-    IMAGE_TYPES,
     LOSSLESS_SUBSCRIPTION,
     POINTS,
     SUBSCRIPTION,
     camera_info_topic,
     declare_topics,
     image_topic,
+    image_type,
 )
+from ahf_ros.nodes.video import Video
 from ahf_ros.nodes.watch import Watch
 from ahf_ros.srv import Identify
 from ahf_ros.text import printable
@@ -204,7 +211,7 @@ class DetectorNode(ProcessNode, LifecycleNodeMixin):
         unused, used = f'.{LOSSLESS_SUBSCRIPTION}.', f'.{SUBSCRIPTION}.'
         if settings.queue == LOSSLESS:
             unused, used = used, unused
-        topics = *(image_topic(self, it) for it in IMAGE_TYPES), POINTS
+        topics = *(image_topic(self, it) for it in IMAGE_TRANSPORTS), POINTS
         begins = [f'qos_overrides.{self.resolve_topic_name(it)}{unused}' for it in topics]
         for name in self._parameter_overrides:
             instead = name.replace(unused, used)
@@ -224,11 +231,12 @@ class DetectorNode(ProcessNode, LifecycleNodeMixin):
             self._subscribed = (transport, settings.queue)
             if self._images:
                 self.unsubscribe(self._images)
-            kind, topic = IMAGE_TYPES[transport], image_topic(self, transport)
+            kind, topic = image_type(transport), image_topic(self, transport)
+            put = Video(self._queue).put if transport == FFMPEG else self._queue.put
             lossless = self._tally.lossless = settings.queue == LOSSLESS
             # The callback may write to the disk and must not block the others.
             group = MutuallyExclusiveCallbackGroup()
-            self._images = self.subscribe(kind, topic, self._queue.put, group, lossless)
+            self._images = self.subscribe(kind, topic, put, group, lossless)
 
     def _service_detector(self, settings: DetectorNodeSettings) -> ServiceDetector | None:
         """Return the detector that calls a service, if the settings name it."""

@@ -158,6 +158,11 @@ class ImageQueue:
         if given_up:
             self._drop(image.pipeline, (image.header,), given_up)
 
+    def refuse(self, header: Header, error: Exception) -> None:
+        """Answer an image that did not even become a message, with the reason."""
+        self._tally.received += 1
+        self._refuse(self.pipeline, why_refused(error, items=(header,)))
+
     def identify(self, message: ImageMessage, expected: int | None = None) -> CodedTargetArray:
         """Identify an image out of turn; called in the thread of the worker.
 

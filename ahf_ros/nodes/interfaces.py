@@ -67,7 +67,10 @@ _DETECTOR = _interfaces("""
 in image sensor_msgs/Image \
     mono, colour, Bayer, YUV422; 8 and 16 bits and floats; any step and byte order
 in image/compressed sensor_msgs/CompressedImage \
-    with `image_transport` compressed: JPEG, PNG of 8 and 16 bits
+    with `image_transport` compressed: JPEG, WebP, PNG of 8 and 16 bits, TIFF
+in image/zstd sensor_msgs/CompressedImage with `image_transport` zstd
+in image/ffmpeg ffmpeg_image_transport_msgs/FFMPEGPacket \
+    with `image_transport` ffmpeg: H.264, HEVC, AV1 and other video
 in camera_info sensor_msgs/CameraInfo with `undistort`
 in points sensor_msgs/PointCloud2 with `cloud`: organised, one point per pixel
 out coded_targets ahf_ros/CodedTargetArray \

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import array
 import math
+import sys
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from types import ModuleType
@@ -188,21 +189,24 @@ def cloud_message(points: np.ndarray, header: Header) -> PointCloud2:
 
 
 def image_message(image: np.ndarray, header: Header) -> Image:
-    """Return the message of an image, uint8.
+    """Return the message of an image, uint8 or, where it is gray, uint16.
 
-    Gray, shape (height, width), is sent as mono8; blue, green, red, (height, width, 3), as bgr8.
+    Gray, shape (height, width), is sent as mono8 or mono16; blue, green, red, (height, width, 3),
+    as bgr8.
     """
     height, width = image.shape[:2]
-    encoding, channels = ('mono8', 1) if image.ndim == 2 else ('bgr8', 3)
+    gray = 'mono8' if image.dtype == np.uint8 else 'mono16'
+    encoding, channels = (gray, 1) if image.ndim == 2 else ('bgr8', 3)
     # An ndarray assigned to `data` is checked value by value; an array of bytes is taken as it is.
-    data = array.array('B', bytes(image.size))
-    np.frombuffer(data, np.uint8).reshape(image.shape)[:] = image
+    data = array.array('B', bytes(image.nbytes))
+    np.frombuffer(data, image.dtype).reshape(image.shape)[:] = image
     return Image(
         header=header,
         height=height,
         width=width,
         encoding=encoding,
-        step=width * channels,
+        is_bigendian=sys.byteorder == 'big',
+        step=width * channels * image.itemsize,
         data=data,
     )
 

@@ -8,6 +8,7 @@ effort. `QoSOverridingOptions` of rclpy accepts a depth of 0 and does not say wh
 from __future__ import annotations
 
 from collections.abc import Sequence
+from importlib import import_module
 from typing import Any
 
 from rclpy.node import Node
@@ -16,13 +17,20 @@ from sensor_msgs.msg import CompressedImage, Image
 
 from ahf_ros.nodes.drivers import beside
 from ahf_ros.nodes.parameters import descriptor
+from ahf_ros.nodes.settings import FFMPEG, IMAGE_TRANSPORTS, PACKAGES, RAW
 from ahf_ros.settings.parameter import Parameter
 
 IMAGE = 'image'
 """Base topic of the images; remapping it moves the topics of this module as well."""
 
-IMAGE_TYPES = {'raw': Image, 'compressed': CompressedImage}
-"""Type of the images by image transport."""
+
+def image_type(transport: str) -> type:
+    """Return the type of the images of one of `IMAGE_TRANSPORTS`."""
+    if transport == FFMPEG:
+        packet: type = import_module(f'{PACKAGES[FFMPEG]}.msg').FFMPEGPacket
+        return packet
+    return Image if transport == RAW else CompressedImage
+
 
 CODED_TARGETS = 'coded_targets'
 """What is identified."""
@@ -56,8 +64,8 @@ BEST_AVAILABLE = 'best_available'
 
 
 def image_topic(node: Node, transport: str) -> str:
-    """Return the topic of one of `IMAGE_TYPES`: the base topic of the images, or one below it."""
-    if transport == 'raw':
+    """Return the topic of one of `IMAGE_TRANSPORTS`: the base topic, or one below it."""
+    if transport == RAW:
         return IMAGE
     derived = f'{node.resolve_topic_name(IMAGE)}/{transport}'
     return _remapped(node, f'{IMAGE}/{transport}') or derived
@@ -76,7 +84,7 @@ def _remapped(node: Node, name: str) -> str:
 
 def declare_topics(node: Node) -> None:
     """Declare the overrides of the topics that come and go with the parameters of the detector."""
-    images = [image_topic(node, transport) for transport in IMAGE_TYPES]
+    images = [image_topic(node, transport) for transport in IMAGE_TRANSPORTS]
     for topic in (*images, camera_info_topic(node), POINTS):
         for end in (SUBSCRIPTION, LOSSLESS_SUBSCRIPTION):
             declare_qos(node, end, topic, IMAGES_KEPT if topic in images else 1)

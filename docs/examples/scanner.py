@@ -5,8 +5,8 @@
     python scanner.py box.csv
 
 The second command writes the coordinates of the targets on two sides of the box, and makes a scan
-of two sides for every Enter, until it has been around, and for every call of its service: trigger.py
-calls it. `ros2 bag record -a` keeps the scans, `ros2 bag play` repeats them.
+of two sides for every Enter, until it has been around, and for every call of its service, as of
+trigger.py. `ros2 bag record -a` keeps the scans, `ros2 bag play` repeats them.
 """
 
 from __future__ import annotations

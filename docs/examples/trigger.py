@@ -40,8 +40,8 @@ class Cell(Node):
     def __init__(self) -> None:
         super().__init__('cell')
         self.trigger = self.create_client(Trigger, 'capture')
-        # camera_info has the header of the image and is small. It is reliable here, as that of most
-        # drivers; a driver that sends it as sensor data needs qos_profile_sensor_data.
+        # camera_info has the header of the image and is small. It is reliable here, as that of
+        # most drivers; one that sends it as sensor data needs qos_profile_sensor_data.
         self.headers: list[tuple[int, int]] = []
         self.seen = self.create_subscription(CameraInfo, 'camera_info', self.taken, 10)
         self.answers: dict[tuple[int, int], CodedTargetArray] = {}

@@ -48,7 +48,7 @@ def test_every_shot_is_answered(graph: Graph, tmp_path: Path) -> None:
 def test_what_does_not_come_is_named(graph: Graph) -> None:
     cell = runpy.run_path(str(EXAMPLES / 'trigger.py'))['Cell']()
     try:
-        with pytest.raises(TimeoutError, match='the trigger did not come within 0.1 s'):
+        with pytest.raises(TimeoutError, match=r'the trigger did not come within 0\.1 s'):
             cell.until('the trigger', 0.1, lambda: None)
     finally:
         cell.destroy_node()
