@@ -15,6 +15,7 @@ from ahf_ros.extras import need
 from ahf_ros.imaging.image import check_size
 
 _KEY_FRAME = 1  # in the flags of a packet, AV_PKT_FLAG_KEY of FFmpeg
+_MOST_LATE = 16  # images that a codec may hold back to put them in order
 _CODECS = {'264': 'h264', 'h265': 'hevc', 'x265': 'hevc', 'hevc': 'hevc', 'av1': 'av1'}
 _OTHERS = 'mjpeg', 'ffv1', 'vp8', 'vp9', 'mpeg4'
 
@@ -53,8 +54,10 @@ class VideoDecoder:
         self._waiting: dict[int, Any] = {}  # headers of packets by their number
         self._number = 0
 
-    def decode(self, message: Any) -> Iterator[tuple[Any, np.ndarray]]:
+    def decode(self, message: Any) -> Iterator[tuple[Any, np.ndarray | None]]:
         """Yield header and image, uint8 or uint16, of each image that a packet completes.
+
+        The image is None of a packet that gave none, as it may be where it is damaged.
 
         `message` is an ffmpeg_image_transport_msgs/FFMPEGPacket. Most often it completes its own
         image, but a codec may need later packets as well. A ValueError says why a packet is not
@@ -81,6 +84,9 @@ class VideoDecoder:
             header = self._waiting.pop(frame.pts, message.header)
             deep = any(it.bits > 8 for it in frame.format.components)
             yield header, frame.to_ndarray(format='gray16le' if deep else 'gray')
+        late = _MOST_LATE if self._context.has_b_frames else 0
+        while len(self._waiting) > late:
+            yield self._waiting.pop(min(self._waiting)), None
 
     def _begin(self, codec: str) -> None:
         import av

@@ -24,6 +24,9 @@ class Video:
         """Take the next packet, an ffmpeg_image_transport_msgs/FFMPEGPacket."""
         try:
             for header, image in self._decoder.decode(packet):
-                self._queue.put(image_message(image, header))
+                if image is None:
+                    self._queue.refuse(header, ValueError('a packet of video gives no image'))
+                else:
+                    self._queue.put(image_message(image, header))
         except Exception as error:  # no packet may end the node
             self._queue.refuse(packet.header, error)
