@@ -25,6 +25,7 @@ EXTRAS = {
     'print': Extra('PDF of ahf targets', ('reportlab',)),
     'report': Extra('ahf report', ('jinja2',)),
     'urls': Extra('images behind URLs', ('fsspec',)),
+    'video': Extra('image_transport ffmpeg', ('av',)),
 }
 """The extras for users, as pyproject.toml has them."""
 

@@ -21,6 +21,7 @@ from ahf_ros.imaging.movement import Displacement, displacement, find_edges, tar
 from ahf_ros.imaging.stack import ImageStack, unlike
 from ahf_ros.interchange.image_files import NotedImage
 from ahf_ros.interchange.image_messages import decode_compressed, decode_image, nanoseconds
+from ahf_ros.interchange.target_messages import DROPPED, FAILED, REJECTED
 from ahf_ros.session import create_identifier
 from ahf_ros.session_settings import SLIDING, IdentificationSettings, StackSettings
 from ahf_ros.target import Identification, Target, count_codes
@@ -74,12 +75,18 @@ class Answer(Generic[Item]):
     stack : ImageStack
         The images.
     identification : Identification
+    note : str
+        What else there is to say, such as that an image is damaged; printable.
+    settled : tuple of str
+        The families that the images so far have settled, see `Memory`.
     """
 
     items: tuple[Item, ...]
     fresh: int
     stack: ImageStack
     identification: Identification
+    note: str = ''
+    settled: tuple[str, ...] = ()
 
     @property
     def image(self) -> np.ndarray:
@@ -95,9 +102,17 @@ class Kind(Enum):
     SPLIT = auto()
     """The images of a stack cannot be identified together."""
     REFUSED = auto()
-    """An image or a stack is not accepted."""
+    """An image is not accepted."""
+    FAILED = auto()
+    """An image or a stack that is accepted could not be identified."""
+    DROPPED = auto()
+    """An image or a stack is given up without a look at it."""
     DAMAGED = auto()
     """An image is not whole; what is left of it is identified."""
+
+
+STATUS = {Kind.REFUSED: REJECTED, Kind.FAILED: FAILED, Kind.DROPPED: DROPPED}
+"""What answers say of images that a remark of a kind is about instead of an identification."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,6 +122,7 @@ class Remark:
     kind: Kind
     text: str  # printable
     error: Exception | None = field(default=None, compare=False)
+    items: tuple[Any, ...] = field(default=(), compare=False)  # images that get no other answer
 
 
 class Stream(Generic[Item]):
@@ -132,7 +148,7 @@ class Stream(Generic[Item]):
     >>> stream = Stream(settings, StackSettings(), create_detector(family='metashape12'))
     >>> image = render(SceneSettings(width=320, height=240, targets=3, dot_radius=8)).image
     >>> for name, pixels in {'good': image, 'bad': image[:0]}.items():
-    ...     for said in stream.add(lambda: Frame(name, pixels, 'mono8', 0)):
+    ...     for said in stream.add(lambda: Frame(name, pixels, 'mono8', 0), name):
     ...         print(said.text if isinstance(said, Remark) else said.identification.count)
     3
     image is 320 x 0 px, accepted is at least 16 x 16 px
@@ -164,11 +180,10 @@ class Stream(Generic[Item]):
         """Number of images that wait for the rest of their stack."""
         return self._window.fresh
 
-    def forget(self) -> int:
-        """Begin a new stack without an answer to what waits; return the number of these images."""
-        waiting = self.waiting
-        self._window.end('')
-        return waiting
+    def forget(self) -> tuple[Item, ...]:
+        """Begin a new stack without an answer to what waits, and return what stands for it."""
+        ended = self._window.end('')
+        return tuple(frame.item for gathered in ended for frame in _fresh(gathered))
 
     def reset(self) -> None:
         """Forget what worked for earlier images."""
@@ -178,7 +193,7 @@ class Stream(Generic[Item]):
         """Identify the targets of an image that is in no stack, as `Identifier.identify` does."""
         stack = ImageStack((frame.image,))
         found = self._identifier.identify(stack, expected_targets=expected_targets)
-        return self._answer((frame.item,), 1, stack, found)
+        return self._answer((frame,), 1, stack, found)
 
     def resume(self, memory: Memory, read: Callable[[], Frame[Item]]) -> None:
         """Go on as if an image had just been answered and had left this memory.
@@ -187,15 +202,18 @@ class Stream(Generic[Item]):
         """
         self._identifier.memory = memory
         if self._stacking.stack > 1:
-            list(self._gathered(read))
+            list(self._gathered(read, None))
 
-    def add(self, read: Callable[[], Frame[Item]]) -> Iterator[Answer[Item] | Remark]:
+    def add(
+        self, read: Callable[[], Frame[Item]], item: Item | None = None
+    ) -> Iterator[Answer[Item] | Remark]:
         """Add an image, and yield what there is to say and the answers to what is complete.
 
-        `read` returns the image; what it raises is why the image is refused. Only `Unavailable` is
-        raised again: that a detector cannot be used is not the fault of the image.
+        `read` returns the image; what it raises is why the image is refused, and `item` stands for
+        the image then. The error of a remark is `Unavailable` if the detector cannot be used,
+        which is not the fault of the image: another run may find the detector.
         """
-        for gathered in self._gathered(read):
+        for gathered in self._gathered(read, item):
             if isinstance(gathered, Remark):
                 yield gathered
             else:
@@ -207,7 +225,7 @@ class Stream(Generic[Item]):
             yield from self._answers(gathered)
 
     def _gathered(
-        self, read: Callable[[], Frame[Item]]
+        self, read: Callable[[], Frame[Item]], item: Item | None
     ) -> Iterator[Gathered[Frame[Item]] | Remark]:
         """Add an image to the window and yield the stacks that this completes."""
         try:
@@ -215,36 +233,59 @@ class Stream(Generic[Item]):
             if self._stacking.stack > 1:
                 check_image(frame.image)
         except Exception as error:
-            yield refusal(error)
+            yield why_refused(error, items=() if item is None else (item,))
             return
         if frame.damage:
-            yield Remark(Kind.DAMAGED, f'the image is damaged: {frame.damage}')
+            yield Remark(Kind.DAMAGED, damaged(frame))
         yield from self._window.add(frame, frame.kind, frame.stamp)
 
     def _answers(self, gathered: Gathered[Frame[Item]]) -> Iterator[Answer[Item] | Remark]:
         """Identify the targets of a stack."""
-        if gathered.reason:
-            yield Remark(Kind.INCOMPLETE, f'a stack of {gathered.reason}')
-        items = tuple(frame.item for frame in gathered.items)
-        images = [frame.image for frame in gathered.items]
-        old = len(items) - gathered.fresh
+        incomplete = f'a stack of {gathered.reason}' if gathered.reason else ''
+        if incomplete:
+            yield Remark(Kind.INCOMPLETE, incomplete)
+        frames = gathered.items
+        first_fresh = done = len(frames) - gathered.fresh
         try:
             for part, stack, found in identify_parts(
-                self._identifier, images, self._stacking, fresh=gathered.fresh
+                self._identifier,
+                [frame.image for frame in frames],
+                self._stacking,
+                fresh=gathered.fresh,
             ):
-                if part.split:
-                    yield Remark(Kind.SPLIT, f'a stack is split: {part.split}')
-                start, stop = part.images.start, part.images.stop
-                yield self._answer(items[start:stop], stop - max(start, old), stack, found)
+                split = f'a stack is split: {part.split}' if part.split else ''
+                if split:
+                    yield Remark(Kind.SPLIT, split)
+                start, done = part.images.start, part.images.stop
+                fresh = done - max(start, first_fresh)
+                yield self._answer(frames[start:done], fresh, stack, found, incomplete, split)
         except Exception as error:
-            yield refusal(error)
+            yield why_failed(error, frames[done:])
 
     def _answer(
-        self, items: tuple[Item, ...], fresh: int, stack: ImageStack, found: Identification
+        self,
+        frames: tuple[Frame[Item], ...],
+        fresh: int,
+        stack: ImageStack,
+        found: Identification,
+        *said: str,
     ) -> Answer[Item]:
         if not self._timed:
             found = replace(found, filter=replace(found.filter, duration=0.0))
-        return Answer(items=items, fresh=fresh, stack=stack, identification=found)
+        notes = *said, *(damaged(frame) for frame in frames if frame.damage)
+        return Answer(
+            items=tuple(frame.item for frame in frames),
+            fresh=fresh,
+            stack=stack,
+            identification=found,
+            note='; '.join(filter(None, notes)),
+            settled=self.memory.families,
+        )
+
+
+def damaged(frame: Frame[Any]) -> str:
+    """Return in words that an image is not whole."""
+    return f'the image is damaged: {frame.damage}'
 
 
 def refusal(error: Exception) -> Remark:
@@ -254,11 +295,24 @@ def refusal(error: Exception) -> Remark:
     return why_refused(error)
 
 
-def why_refused(error: Exception) -> Remark:
-    """Return in printable words why an image is refused that raises an error, whichever."""
+def why_refused(
+    error: Exception, kind: Kind = Kind.REFUSED, items: tuple[Any, ...] = ()
+) -> Remark:
+    """Return in printable words why images are refused that raise an error, whichever."""
     expected = isinstance(error, ValueError)
     text = printable(str(error), _MAXIMUM_REASON) if expected else reason_of(error)
-    return Remark(kind=Kind.REFUSED, text=text, error=error)
+    return Remark(kind=kind, text=text, error=error, items=items)
+
+
+def why_failed(error: Exception, frames: Sequence[Frame[Any]]) -> Remark:
+    """Return why images are not identified: one of them is refused, or else something failed."""
+    kind = Kind.FAILED
+    for frame in frames:
+        try:
+            check_image(frame.image)
+        except ValueError:
+            kind = Kind.REFUSED
+    return why_refused(error, kind, tuple(frame.item for frame in frames))
 
 
 @dataclass(frozen=True, slots=True)
@@ -325,6 +379,11 @@ class Window(Generic[Item]):
             return []
         reason = f'{len(items)} of {self._size} images: {why}'
         return [Gathered(items=items, fresh=fresh, reason=reason)]
+
+
+def _fresh(gathered: Gathered[Item]) -> tuple[Item, ...]:
+    """Return the images of a stack that have not been answered before."""
+    return gathered.items[len(gathered.items) - gathered.fresh :]
 
 
 @dataclass(frozen=True, slots=True)

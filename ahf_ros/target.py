@@ -114,6 +114,12 @@ class SquareMarker(Target):
         Corners, px, clockwise from the top left corner of the upright marker.
     border : int
         Width of the dark border, cells: 1, or 2 as in the AprilGrids of Kalibr.
+    hamming : int, optional
+        Number of its cells whose colour in the image as received is not that of the marker. None
+        where they were not looked at.
+    decision_margin : float, optional
+        Mean distance of its cells in the image as received from the threshold between ink and
+        paper, 0 to 255, as the AprilTag library has it. None where they were not looked at.
 
     Examples
     --------
@@ -124,6 +130,8 @@ class SquareMarker(Target):
 
     corners: tuple[tuple[float, float], ...] = ()
     border: int = 1
+    hamming: int | None = None
+    decision_margin: float | None = None
 
 
 @dataclass(frozen=True, slots=True)

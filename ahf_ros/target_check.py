@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import fields
 from functools import partial
 from itertools import islice
@@ -15,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from ahf_ros.target import UNDECODED, Target
+from ahf_ros.target import UNDECODED, SquareMarker, Target
 from ahf_ros.text import shown
 
 MAXIMUM_ID = 2**31 - 1
@@ -65,6 +66,8 @@ def checked_target(target: Any, name: str) -> Target:
         value = getattr(target, item.name, None)
         values[item.name] = checked = _CHECKS[item.name](value, f'{name}: {item.name}')
         changed |= checked is not value
+    if isinstance(target, SquareMarker) and not changed:
+        _check_corners(target.corners, f'{name}: corners')
     return Target(**values) if changed else target
 
 
@@ -136,6 +139,14 @@ def _covariance(value: Any, name: str) -> tuple[float, ...]:
         f'{name} is {shown(value)}, accepted are four finite numbers, row-major, of a symmetric '
         'positive semidefinite matrix'
     )
+
+
+def _check_corners(value: Any, name: str) -> None:
+    with suppress(TypeError, ValueError):
+        corners = np.array(value, np.float64)
+        if corners.shape == (4, 2) and np.abs(corners).max() <= MAXIMUM_LENGTH_PX:
+            return
+    raise ValueError(f'{name} is {shown(value)}, accepted are four pairs of numbers, px')
 
 
 def _listed(value: Any) -> list[Any]:

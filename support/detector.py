@@ -80,12 +80,23 @@ class DetectorProcess:
         self.diagnostics.clear()
         return {item.key: item.value for item in status.values}
 
+    @cached_property
+    def images(self) -> Any:
+        """A publisher of images that keeps as many as come at once."""
+        topic = f'{self.namespace}/image'
+        made = self.graph.node.create_publisher(Image, topic, 100)
+        known = len(self.graph.node.get_subscriptions_info_by_topic(topic))
+        self.graph.until(lambda: made.get_subscription_count() == known)
+        return made
+
+    def answers_to(self, message: Image) -> list[CodedTargetArray]:
+        """Return what has been answered to an image."""
+        return [it for it in self.targets if it.header == message.header]
+
     def answer(self, message: Image) -> CodedTargetArray:
         """Return the answer to an image."""
         self.image.publish(message)
-        return self.graph.until(
-            lambda: next((it for it in self.targets if it.header == message.header), None)
-        )
+        return self.graph.until(lambda: self.answers_to(message))[0]
 
     def identify(self, message: Image, expected: int = 0) -> Identify.Response:
         """Return the answer of the service."""

@@ -52,6 +52,7 @@ ROSDEP = {
 key."""
 
 NOT_IN_ROSDEP = {
+    'av',
     'pupil_apriltags',
     'Metashape',
     'distributed',

@@ -181,13 +181,30 @@ def test_a_stream_answers_and_says_why_it_does_not():
 def test_what_a_detector_raises_is_why_an_image_is_refused(error, text):
     stream = Stream(IdentificationSettings(), StackSettings(), Searched(error))
     (remark,) = stream.add(lambda: frame('a'))
-    assert remark == Remark(Kind.REFUSED, text)
+    assert remark == Remark(Kind.FAILED, text)
+    assert remark.items == ('a',)
 
 
-def test_a_detector_that_cannot_be_used_refuses_no_image():
+def test_a_detector_that_cannot_be_used_is_no_fault_of_an_image():
     stream = Stream(IdentificationSettings(), StackSettings(), Searched(Unavailable('gone')))
-    with pytest.raises(Unavailable, match='gone'):
-        list(stream.add(lambda: frame('a')))
+    (remark,) = stream.add(lambda: frame('a'))
+    assert (remark.kind, remark.items) == (Kind.FAILED, ('a',))
+    assert isinstance(remark.error, Unavailable)
+
+
+def test_every_image_that_gets_no_answer_is_in_a_remark():
+    detector = Searched()
+    stream = Stream(IdentificationSettings(), StackSettings(stack=2), detector)
+    assert [it.items for it in stream.add(lambda: {}['no image'], 'a')] == [('a',)]
+    constant = Frame(item='b', image=np.zeros((30, 40), np.uint8), kind='', stamp=0)
+    (remark,) = Stream(IdentificationSettings(), StackSettings(), detector).add(lambda: constant)
+    assert (remark.kind, remark.items) == (Kind.REFUSED, ('b',))
+    assert said(stream.add(lambda: frame('c'))) == []
+    assert (stream.forget(), stream.forget()) == (('c',), ())
+    detector.error = ValueError('bad')
+    assert said(stream.add(lambda: frame('d'))) == []
+    (remark,) = stream.add(lambda: frame('e'))
+    assert (remark.kind, remark.items) == (Kind.FAILED, ('d', 'e'))
 
 
 def test_a_stream_that_is_resumed_goes_on_as_if_it_had_not_ended():

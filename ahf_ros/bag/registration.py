@@ -23,6 +23,7 @@ from ahf_ros.interchange.image_messages import nanoseconds
 from ahf_ros.interchange.matching import ANSWER, ANSWERS, CLOUD, WAITING_MEMORY, Matcher
 from ahf_ros.interchange.point_clouds import organised_points
 from ahf_ros.interchange.registration_files import write_registration
+from ahf_ros.interchange.target_messages import is_answered
 from ahf_ros.localisation import labelled
 from ahf_ros.registration_settings import RegistrationSettings
 from ahf_ros.scans import Scans, known_targets, located, scan_cloud
@@ -136,6 +137,8 @@ class _Shots:
                     organised_points(message)
             except ValueError as error:
                 self.refuse(time, error)
+                continue
+            if side == ANSWER and not is_answered(message):
                 continue
             item = message, time
             match = matcher.put(side, nanoseconds(message.header), item, size)

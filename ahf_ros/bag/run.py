@@ -11,7 +11,7 @@ import json
 import re
 import sqlite3
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import closing
+from contextlib import closing, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -40,13 +40,14 @@ from ahf_ros.bag.output import (
 from ahf_ros.bag.registration import RegistrationTask, check_registration
 from ahf_ros.bag.source import METADATA, Message, Source
 from ahf_ros.detectors import create_detector
+from ahf_ros.detectors.contract import Unavailable
 from ahf_ros.drawing.overlay import draw
-from ahf_ros.interchange.target_messages import coded_target_array
+from ahf_ros.interchange.target_messages import coded_target_array, unanswered
 from ahf_ros.opening import parsing
 from ahf_ros.session_settings import IdentificationSettings, StackSettings
 from ahf_ros.settings.nested import flat_values
 from ahf_ros.settling import settled_families
-from ahf_ros.stream import Answer, Frame, Kind, Remark, Stream, message_frame, refusal
+from ahf_ros.stream import STATUS, Answer, Frame, Kind, Remark, Stream, message_frame, why_failed
 from ahf_ros.writing import locked
 
 WRITING_ERRORS = (OSError, sqlite3.Error, WriterError)
@@ -56,7 +57,7 @@ Report = Callable[[int, int, str], None]
 """Called after each image with the number of finished images, the number of all images or 0 if
 unknown, and what there is to say about this image or its stack, empty if there is nothing."""
 
-_FORMAT = 5  # version of the journal and of the data stored in a bag
+_FORMAT = 6  # version of the journal and of the data stored in a bag
 _TOPIC_NAME = re.compile(r'/?[A-Za-z_]\w*(/[A-Za-z_]\w*)*', re.ASCII)
 _ADDRESS = re.compile('[?#%]')  # rosbags opens SQLite files by an address
 
@@ -262,19 +263,22 @@ class _Answering:
         outputs: list[Output] = []
         remarks: list[Remark] = []
         for name, it in said:
+            if isinstance(it, Remark):
+                if isinstance(it.error, Unavailable):
+                    raise it.error
+                remarks.append(it)
+                outputs += self._refusals(self._topics[name], it, message)
+                continue
             try:
-                if isinstance(it, Remark):
-                    remarks.append(it)
-                else:
-                    outputs += list(self._messages(self._topics[name], it))
+                outputs += list(self._messages(self._topics[name], it))
             except Exception as error:
-                remarks.append(refusal(error))
+                remarks.append(why_failed(error, ()))
         entry = Entry(
             topic=topic,
             timestamp=timestamp,
             memory=self._streams[topic].memory,
-            reason='; '.join(it.text for it in remarks if it.kind == Kind.REFUSED),
-            note='; '.join(it.text for it in remarks if it.kind != Kind.REFUSED),
+            reason='; '.join(it.text for it in remarks if it.kind in STATUS),
+            note='; '.join(it.text for it in remarks if it.kind not in STATUS),
             damaged=any(it.kind == Kind.DAMAGED for it in remarks),
         )
         return entry, outputs
@@ -284,13 +288,44 @@ class _Answering:
         self._streams[entry.topic].resume(entry.memory, lambda: self._frame(message))
 
     def _frame(self, message: Message) -> Frame[Any]:
+        return message_frame(self._sent(message))
+
+    def _sent(self, message: Message) -> Any:
         connection, _, data = message
-        return message_frame(self._source.stores.deserialize(connection, data))
+        return self._source.stores.deserialize(connection, data)
+
+    def _refusals(
+        self, topics: AnswerTopics, remark: Remark, message: Message
+    ) -> Iterator[Output]:
+        """Yield answers to the images that a remark is about, if they get no other.
+
+        An image that was not read is that of the message; one that is no message has no header.
+        """
+        headers = remark.items
+        if remark.kind == Kind.REFUSED and not headers:
+            with suppress(ValueError):
+                headers = (self._sent(message).header,)
+        for header in headers:
+            status, family = STATUS[remark.kind], self._family
+            yield self._output(
+                topics, unanswered(status, remark.text, family, header, self._types)
+            )
+
+    def _output(self, topics: AnswerTopics, answer: Any) -> Output:
+        return topics.targets, bytes(self._store.serialize_cdr(answer, CODED_TARGETS))
 
     def _messages(self, topics: AnswerTopics, answer: Answer[Any]) -> Iterator[Output]:
         header, found = answer.items[-1], answer.identification
-        message = coded_target_array(found, self._family, answer.stack.shape, header, self._types)
-        yield topics.targets, bytes(self._store.serialize_cdr(message, CODED_TARGETS))
+        message = coded_target_array(
+            found,
+            self._family,
+            answer.stack.shape,
+            header,
+            self._types,
+            reason=answer.note,
+            settled=answer.settled,
+        )
+        yield self._output(topics, message)
         if topics.debug_image:
             _, encoded = cv2.imencode('.jpg', draw(answer.image, found))
             drawn = self._store.types[COMPRESSED_IMAGE](

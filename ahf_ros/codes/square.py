@@ -8,7 +8,7 @@ from typing import Any
 import cv2
 import numpy as np
 
-from ahf_ros.codes import SQUARE_NAMES
+from ahf_ros.codes import APRILTAG_NAMES, SQUARE_NAMES
 
 _PLAIN = 0.3  # share of the corners of cells; it is 0.5 of random cells
 
@@ -93,3 +93,23 @@ def borders(name: str) -> tuple[int, ...]:
     Kalibr prints AprilTags with two in its AprilGrids.
     """
     return (1, 2) if name.startswith('apriltag_') else (1,)
+
+
+def corner_order(name: str) -> tuple[int, int, int, int]:
+    """Return which corner of a marker comes first, second, ... in `apriltag_msgs`.
+
+    The corners of a `SquareMarker` are clockwise from the top left one of the marker as OpenCV
+    prints it. Those of the AprilTag library are counter-clockwise from the bottom left one of the
+    tag as it prints that itself: half a turn from the print of OpenCV [1]_. Markers of other
+    families have no other print.
+
+    References
+    ----------
+    .. [1] AprilRobotics/apriltag, `apriltag_detection_t` in apriltag.h; opencv-python #1195.
+    """
+    return (1, 0, 3, 2) if name in APRILTAG_NAMES else (3, 2, 1, 0)
+
+
+def library_name(name: str) -> str:
+    """Return what the library of a family calls it: tag36h11 is `apriltag_36h11` here."""
+    return name.replace('apriltag_', 'tag') if name in APRILTAG_NAMES else name

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import cv2
 import numpy as np
 
-from ahf_ros.target import Target
+from ahf_ros.target import SquareMarker, Target
 
 MODELS = {
     'plumb_bob': (4, 5),
@@ -240,7 +240,19 @@ def undistorted_targets(camera: Calibration, targets: Sequence[Target]) -> tuple
     centres = np.array([(target.x, target.y) for target in targets]).reshape(-1, 2)
     moved = undistorted(camera, centres).tolist()
     derivatives = _derivatives(undistorted, camera, centres, _MARGIN)
-    return tuple(map(_moved, targets, moved, derivatives))
+    return tuple(
+        _with_corners(camera, target, of)
+        for target, of in zip(targets, map(_moved, targets, moved, derivatives), strict=True)
+    )
+
+
+def _with_corners(camera: Calibration, target: Target, moved: Target) -> Target:
+    """Return a moved target with the corners that the target has, if it is a square marker."""
+    if not isinstance(target, SquareMarker):
+        return moved
+    corners = tuple(map(tuple, undistorted(camera, np.array(target.corners)).tolist()))
+    names = 'x', 'y', 'semi_major', 'semi_minor', 'angle', 'covariance'
+    return replace(target, **{name: getattr(moved, name) for name in names}, corners=corners)
 
 
 def _moved(target: Target, centre: list[float], derivatives: np.ndarray) -> Target:
@@ -268,4 +280,5 @@ def _moved(target: Target, centre: list[float], derivatives: np.ndarray) -> Targ
         confidence=target.confidence,
         covariance=(xx, xy, yx, yy),
         family=target.family,
+        polarity=target.polarity,
     )

@@ -6,14 +6,18 @@ range: a 12-bit camera's or a float scanner's are not scaled before the logarith
 
 from __future__ import annotations
 
+import struct
+import zlib
 from dataclasses import dataclass
+from types import SimpleNamespace
 from typing import Any
 
 import cv2
 import numpy as np
 
-from ahf_ros.imaging.image import without_gaps
+from ahf_ros.imaging.image import check_size, without_gaps
 from ahf_ros.interchange.image_files import NotedImage, decode_bytes
+from ahf_ros.text import shown
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,6 +38,8 @@ class Encoding:
         """Bytes per pixel in a row of the image."""
         return self.samples * np.dtype(self.kind).itemsize
 
+
+_MAXIMUM_DATA = 2**33  # bytes of an image, as many as 2**28 px of the largest kind have
 
 WITH_PLANES = 'nv12', 'nv21', 'nv24', 'i420'
 """Encodings with gray values first, and colours in planes behind them."""
@@ -149,10 +155,37 @@ def _gray(samples: np.ndarray, encoding: Encoding) -> np.ndarray:
 def decode_compressed(message: Any) -> NotedImage:
     """Return the gray image of a sensor_msgs/CompressedImage, and whether it is damaged.
 
-    It holds a file that OpenCV reads, such as a JPEG, or a PNG of 8 or 16 bit; if not, a
-    ValueError is raised.
+    It holds a file that OpenCV reads, such as a JPEG, or a PNG of 8 or 16 bit, or an Image as
+    zstd_image_transport packs it; if not, a ValueError is raised.
     """
+    if message.format == 'zstd':
+        return NotedImage(decode_image(_unpacked(bytes(message.data))))
     return decode_bytes(message.data, f'data of format {message.format!r}')
+
+
+def _unpacked(packed: bytes) -> Any:
+    """Return the Image in data of zstd_image_transport, which are not of zstd, but of zlib."""
+    layout = struct.Struct('<2IB2I')
+    if len(packed) < layout.size:
+        raise ValueError(f'data has {len(packed)} bytes, accepted are at least {layout.size}')
+    height, width, is_bigendian, step, length = layout.unpack_from(packed)
+    start, size = layout.size + length, height * step
+    name = packed[layout.size : start].decode('ascii', 'replace')
+    check_size(width, height, f'data of encoding {shown(name)}')
+    if size > _MAXIMUM_DATA:
+        raise ValueError(f'step is {step}, accepted are at most {_MAXIMUM_DATA} bytes in all')
+    try:
+        data = zlib.decompressobj(wbits=32 + zlib.MAX_WBITS).decompress(packed[start:], size + 1)
+    except zlib.error as error:
+        raise ValueError(f'data of format zstd cannot be decoded: {error}') from error
+    return SimpleNamespace(
+        height=height,
+        width=width,
+        encoding=name,
+        is_bigendian=is_bigendian,
+        step=step,
+        data=data,
+    )
 
 
 def nanoseconds(header: Any) -> int:

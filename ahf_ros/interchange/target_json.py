@@ -29,6 +29,7 @@ _ABSENT = {'id': None, 'x': None, 'y': None, 'code': 0, 'semi_major': 0.0, 'semi
 
 _REASONS = 'unread', 'uncertain', 'contested', 'unsettled'  # see `UndecodedTarget`
 _MAXIMUM_DOTS = 1000  # of one target
+_MAXIMUM_CELLS = 1000  # of one marker
 
 
 def to_json(
@@ -184,7 +185,18 @@ def _of_its_kind(target: Target, item: dict[str, Any], name: str) -> Target:
         return DottedTarget(**known, dots=dots, template_dots=template)
     if item.get('corners'):
         border = checked_integer(item.get('border', 1), f'{name}: border', 1, 2)
-        return SquareMarker(**known, corners=_rows(item, 'corners', 2, 4, name), border=border)
+        hamming, margin = item.get('hamming'), item.get('decision_margin')
+        if hamming is not None:
+            hamming = checked_integer(hamming, f'{name}: hamming', 0, _MAXIMUM_CELLS)
+        if margin is not None:
+            margin = checked_number(margin, f'{name}: decision_margin', 0, 255)
+        return SquareMarker(
+            **known,
+            corners=_rows(item, 'corners', 2, 4, name),
+            border=border,
+            hamming=hamming,
+            decision_margin=margin,
+        )
     if 'reason' not in item:
         return target
     if item['reason'] not in _REASONS:

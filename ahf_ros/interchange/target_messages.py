@@ -3,14 +3,20 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import asdict, fields
 from typing import Any, Protocol
 
 import numpy as np
 
-from ahf_ros.target import FilterState, Identification, Target
+from ahf_ros.codes.square import corner_order
+from ahf_ros.target import FilterState, Identification, SquareMarker, Target
 
 _TARGET_FIELDS = [it.name for it in fields(Target) if it.name != 'edge_shift']  # not sent
+_OF_LIBRARY = -1, 1, 1, 1, 1, -1, -1, -1  # corners of an upright marker as apriltag_msgs has them
+
+OK, REJECTED, DROPPED, FAILED = 'OK', 'REJECTED', 'DROPPED', 'FAILED'
+"""What an answer says of its image, as the constants in `CodedTargetArray.msg` are called."""
 
 
 class MessageTypes(Protocol):
@@ -27,11 +33,16 @@ def coded_target_array(
     shape: tuple[int, int],
     header: Any,
     types: MessageTypes,
+    *,
+    status: str = OK,
+    reason: str = '',
+    settled: Sequence[str] = (),
 ) -> Any:
     """Return the CodedTargetArray of an identification, of the classes in `types`.
 
     `family` is what was looked for, a family or several as the settings list them; `shape` is
-    height and width of the image, px, and `header` its header.
+    height and width of the image, px, and `header` its header. `reason` is why the `status` is not
+    `OK`, or what else there is to say; `settled` has the families that images have settled.
     """
     height, width = shape
     shift = identification.edge_shift
@@ -43,23 +54,34 @@ def coded_target_array(
         expected=identification.expected,
         estimated=identification.estimated,
         mirrored=identification.mirrored,
-        targets=[
-            types.CodedTarget(**_values(it) | {'covariance': np.array(it.covariance)})
-            for it in identification.targets
-        ],
+        targets=[types.CodedTarget(**_values(it)) for it in identification.targets],
         filter=types.FilterState(**asdict(identification.filter)),
         edge_shift=math.nan if shift is None else shift,
+        status=getattr(types.CodedTargetArray, status),
+        reason=reason,
+        settled=','.join(settled),
     )
+
+
+def unanswered(status: str, reason: str, family: str, header: Any, types: MessageTypes) -> Any:
+    """Return the CodedTargetArray of an image that was not identified, and why it was not."""
+    nothing, size = Identification(()), (0, 0)
+    return coded_target_array(nothing, family, size, header, types, status=status, reason=reason)
+
+
+def is_answered(message: Any) -> bool:
+    """Return whether the image of a CodedTargetArray was identified; bags may be older than this.
+
+    All were, before a message could say of one that it was not.
+    """
+    return not getattr(message, 'status', 0)
 
 
 def identification_from(message: Any) -> Identification:
     """Return the identification that a CodedTargetArray carries."""
     shift = message.edge_shift
     return Identification(
-        targets=tuple(
-            Target(**_values(item) | {'covariance': tuple(item.covariance.tolist())})
-            for item in message.targets
-        ),
+        targets=tuple(map(_target, message.targets)),
         expected=message.expected,
         filter=FilterState(
             **{it.name: getattr(message.filter, it.name) for it in fields(FilterState)}
@@ -70,6 +92,63 @@ def identification_from(message: Any) -> Identification:
     )
 
 
-def _values(source: Any) -> dict[str, Any]:
-    """Return what a target, or its message, has for the fields that both have."""
-    return {name: getattr(source, name) for name in _TARGET_FIELDS}
+def has_corners(message: Any) -> bool:
+    """Return whether a CodedTarget is a square marker.
+
+    In bags that are older than these fields it has none, and where a program of others left them
+    as they were, all of them are zero.
+    """
+    corners = np.reshape(getattr(message, 'corners', (math.nan, math.nan)), (-1, 2))
+    return bool(np.isfinite(corners).all() and np.ptp(corners, axis=0).all())
+
+
+def _values(target: Target) -> dict[str, Any]:
+    """Return the fields of the message of a target."""
+    values = {name: getattr(target, name) for name in _TARGET_FIELDS}
+    corners, homography = np.full(8, math.nan), np.full(9, math.nan)
+    hamming: float | None = None
+    margin: float | None = None
+    if isinstance(target, SquareMarker):
+        order = corner_order(target.family)
+        corners = np.array([target.corners[it] for it in order], float).ravel()
+        homography = _homography(corners)
+        hamming, margin = target.hamming, target.decision_margin
+    return values | {
+        'covariance': np.array(target.covariance),
+        'corners': corners,
+        'homography': homography,
+        'hamming': math.nan if hamming is None else float(hamming),
+        'decision_margin': math.nan if margin is None else float(margin),
+    }
+
+
+def _target(message: Any) -> Target:
+    """Return the target of a message, a `SquareMarker` where it has corners."""
+    values = {name: getattr(message, name) for name in _TARGET_FIELDS}
+    values['covariance'] = tuple(message.covariance.tolist())
+    if not has_corners(message):
+        return Target(**values)
+    corners = map(tuple, message.corners.reshape(4, 2).tolist())
+    turned = dict(zip(corner_order(message.family), corners, strict=True))
+    hamming, margin = message.hamming, message.decision_margin
+    return SquareMarker(
+        **values,
+        corners=tuple(turned[it] for it in range(4)),
+        hamming=round(hamming) if math.isfinite(hamming) else None,
+        decision_margin=margin if math.isfinite(margin) else None,
+    )
+
+
+def _homography(corners: np.ndarray) -> np.ndarray:
+    """Return the homography to corners, shape (8,), from those of an upright marker, row-major.
+
+    Its last element is one. It is NaN where the corners are no quadrilateral.
+    """
+    rows = np.zeros((8, 8))
+    x, y = np.reshape(_OF_LIBRARY, (4, 2)).T
+    rows[::2, :3] = rows[1::2, 3:6] = np.column_stack((x, y, np.ones(4)))
+    rows[:, 6:] = -corners[:, None] * np.repeat(np.column_stack((x, y)), 2, axis=0)
+    try:
+        return np.append(np.linalg.solve(rows, corners), 1.0)
+    except np.linalg.LinAlgError:
+        return np.full(9, math.nan)

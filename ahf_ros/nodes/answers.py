@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from importlib import import_module
 from types import ModuleType
+from typing import NamedTuple
 
 from rclpy.publisher import Publisher
 from sensor_msgs.msg import Image
@@ -17,13 +19,38 @@ from ahf_ros.msg import CodedTargetArray
 from ahf_ros.nodes.cloud import TargetPoints
 from ahf_ros.nodes.diagnostics import CloudTally, Tally
 from ahf_ros.nodes.inputs import Input
-from ahf_ros.nodes.messages import image_message, target_annotations, target_detections
+from ahf_ros.nodes.messages import (
+    apriltag_detections,
+    image_message,
+    target_annotations,
+    target_detections,
+)
 from ahf_ros.nodes.pipeline import Pipeline
 from ahf_ros.nodes.process import ProcessNode
-from ahf_ros.nodes.settings import DetectorNodeSettings
-from ahf_ros.nodes.topics import ANSWERS_KEPT, CODED_TARGETS, DETECTIONS
+from ahf_ros.nodes.settings import PACKAGES, DetectorNodeSettings
+from ahf_ros.nodes.topics import ANSWERS_KEPT, APRILTAG_DETECTIONS, CODED_TARGETS, DETECTIONS
 from ahf_ros.nodes.undistortion import UndistortedTargets
 from ahf_ros.stream import Answer
+
+
+class _Form(NamedTuple):
+    """A form of answers in messages of another package."""
+
+    setting: str
+    kind: str
+    topic: str
+    made: Callable[[CodedTargetArray, ModuleType], object]
+
+
+_FORMS = (
+    _Form('detections', 'Detection2DArray', DETECTIONS, target_detections),
+    _Form(
+        'apriltag_detections',
+        'AprilTagDetectionArray',
+        APRILTAG_DETECTIONS,
+        apriltag_detections,
+    ),
+)
 
 
 class Answers:
@@ -37,8 +64,8 @@ class Answers:
         self._filtered_image = node.publisher(Image, '~/filtered_image')
         self._annotations = node.publisher(ImageMarker, '~/annotations')
         self._clouds: TargetPoints | None = None
-        self._detections: tuple[ModuleType, Publisher] | None = None
-        self._detecting = False
+        self._forms: dict[str, tuple[ModuleType, Publisher]] = {}  # by the name of their topic
+        self._wanted: tuple[_Form, ...] = ()
         self._undistorted: UndistortedTargets | None = None
 
     def renew(self, settings: DetectorNodeSettings) -> None:
@@ -49,15 +76,21 @@ class Answers:
                 self._tally.clouds = self._tally.clouds or CloudTally()
                 self._clouds = TargetPoints(self._node, settings, self._tally.clouds)
         # A publisher stays once it is there: the answer that is being published may need it.
-        self._detecting = settings.answers.detections
-        if self._detecting and not self._detections:
-            kinds = import_module('vision_msgs.msg')
-            publisher = self._node.publisher(kinds.Detection2DArray, DETECTIONS, ANSWERS_KEPT)
-            self._detections = kinds, publisher
+        self._wanted = tuple(it for it in _FORMS if getattr(settings.answers, it.setting))
+        for form in self._wanted:
+            if form.topic not in self._forms:
+                types = import_module(f'{PACKAGES[form.setting]}.msg')
+                kind = getattr(types, form.kind)
+                publisher = self._node.publisher(kind, form.topic, ANSWERS_KEPT)
+                self._forms[form.topic] = types, publisher
         if settings.answers.undistort and not self._undistorted:
             self._undistorted = UndistortedTargets(self._node, self._tally)
         if self._undistorted:
             self._undistorted.listen(settings.answers.undistort)
+
+    def give_up(self, message: CodedTargetArray) -> None:
+        """Publish that an image was not identified, to those who wait for its stamp."""
+        self._targets.publish(message)
 
     def waiting(self) -> tuple[Input, Waiting] | None:
         """Return where clouds come from and what waits for its match, None without clouds."""
@@ -82,6 +115,7 @@ class Answers:
         """
         message, found = pipeline.message(answer), answer.identification
         self._targets.publish(message)
+        self._tally.settled = answer.settled
         self._tally.answered += answer.fresh
         self._tally.latency = time.monotonic() - received
         self._tally.last = found
@@ -91,9 +125,9 @@ class Answers:
         self._tally.advice = '; '.join(filter(None, lines))
         if clouds := self._clouds:
             clouds.locate(message)
-        if self._detections and self._detecting:
-            kinds, publisher = self._detections
-            publisher.publish(target_detections(message, kinds))
+        for form in self._wanted:
+            types, publisher = self._forms[form.topic]
+            publisher.publish(form.made(message, types))
         if self._undistorted:
             self._undistorted.publish(message, found)
         if self._annotations.get_subscription_count():

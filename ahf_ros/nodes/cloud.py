@@ -10,9 +10,11 @@ from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import Header
 from visualization_msgs.msg import MarkerArray
 
+from ahf_ros.cloud_settings import CloudSettings
 from ahf_ros.interchange.image_messages import nanoseconds
 from ahf_ros.interchange.matching import ANSWER, ANSWERS, CLOUD, Matcher, Waiting
 from ahf_ros.interchange.point_clouds import organised_points
+from ahf_ros.localisation import Positions
 from ahf_ros.msg import CodedTargetArray
 from ahf_ros.nodes.diagnostics import CloudTally
 from ahf_ros.nodes.inputs import Input
@@ -84,19 +86,17 @@ class TargetPoints:
             self._publish(answer, cloud)
 
     def _publish(self, answer: CodedTargetArray, cloud: PointCloud2) -> None:
-        shape = answer.height, answer.width
         try:
-            found = located(organised_points(cloud), answer.targets, shape, self._settings.cloud)
+            points, found = points_of(answer, cloud, self._settings.cloud)
         except ValueError as error:
             self._refuse(str(error))
             return
-        header = Header(stamp=answer.header.stamp, frame_id=cloud.header.frame_id)
         with self._publishing:
             if self._closed:
                 return
-            self._points.publish(target_points(answer.targets, found, header))
+            self._points.publish(points)
             if self._labels.get_subscription_count():
-                self._labels.publish(target_labels(answer.targets, found, header))
+                self._labels.publish(target_labels(answer.targets, found, points.header))
         self._tally.used += 1
         self._tally.positions = f'{found.known.sum()} of {len(answer.targets)}'
 
@@ -105,3 +105,16 @@ class TargetPoints:
         self._tally.reason = reason
         logger = self._node.get_logger()
         logger.warning(f'cloud refused: {reason}', throttle_duration_sec=LOG_PERIOD)
+
+
+def points_of(
+    answer: CodedTargetArray, cloud: PointCloud2, settings: CloudSettings
+) -> tuple[PointCloud2, Positions]:
+    """Return the targets of an answer with their positions in a cloud, and the positions.
+
+    A ValueError says why the cloud is not accepted.
+    """
+    shape = answer.height, answer.width
+    found = located(organised_points(cloud), answer.targets, shape, settings)
+    header = Header(stamp=answer.header.stamp, frame_id=cloud.header.frame_id)
+    return target_points(answer.targets, found, header), found

@@ -20,7 +20,9 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_srvs.srv import Trigger
 
 from ahf_ros import ending
+from ahf_ros.interchange.point_clouds import organised_points
 from ahf_ros.nodes.answers import Answers
+from ahf_ros.nodes.cloud import points_of
 from ahf_ros.nodes.diagnostics import PERIOD, Diagnostics, Tally, publish_status
 from ahf_ros.nodes.image_queue import ImageQueue, Worker
 from ahf_ros.nodes.inputs import Input
@@ -29,17 +31,24 @@ from ahf_ros.nodes.patience import TRIGGERED
 from ahf_ros.nodes.pipeline import STOPPING, Pipeline
 from ahf_ros.nodes.process import ProcessNode, release_memory
 from ahf_ros.nodes.service_detector import ServiceDetector
-from ahf_ros.nodes.settings import LOSSLESS, SERVICE, DetectorNodeSettings
+from ahf_ros.nodes.settings import (
+    FFMPEG,
+    IMAGE_TRANSPORTS,
+    LOSSLESS,
+    SERVICE,
+    DetectorNodeSettings,
+)
 from ahf_ros.nodes.topics import (
     CODED_TARGETS,
-    IMAGE_TYPES,
     LOSSLESS_SUBSCRIPTION,
     POINTS,
     SUBSCRIPTION,
     camera_info_topic,
     declare_topics,
     image_topic,
+    image_type,
 )
+from ahf_ros.nodes.video import Video
 from ahf_ros.nodes.watch import Expected, Watch
 from ahf_ros.srv import Identify
 from ahf_ros.text import printable
@@ -207,6 +216,7 @@ class DetectorNode(ProcessNode, LifecycleNodeMixin):
         self._stopping.set()
         ending.begin()
         self._worker.stop()
+        self._queue.give_up(STOPPING)
 
     def introduction(self) -> str:
         """Return the settings that matter most, and the topics."""
@@ -232,7 +242,7 @@ class DetectorNode(ProcessNode, LifecycleNodeMixin):
         unused, used = f'.{LOSSLESS_SUBSCRIPTION}.', f'.{SUBSCRIPTION}.'
         if settings.queue == LOSSLESS:
             unused, used = used, unused
-        topics = *(image_topic(self, it) for it in IMAGE_TYPES), POINTS
+        topics = *(image_topic(self, it) for it in IMAGE_TRANSPORTS), POINTS
         begins = [f'qos_overrides.{self.resolve_topic_name(it)}{unused}' for it in topics]
         for name in self._parameter_overrides:
             instead = name.replace(unused, used)
@@ -252,11 +262,12 @@ class DetectorNode(ProcessNode, LifecycleNodeMixin):
             self._subscribed = (transport, settings.queue)
             if self._images:
                 self.unsubscribe(self._images)
-            kind, topic = IMAGE_TYPES[transport], image_topic(self, transport)
+            kind, topic = image_type(transport), image_topic(self, transport)
+            put = Video(self._queue).put if transport == FFMPEG else self._queue.put
             lossless = self._tally.lossless = settings.queue == LOSSLESS
             # The callback may write to the disk and must not block the others.
             group = MutuallyExclusiveCallbackGroup()
-            self._images = self.subscribe(kind, topic, self._queue.put, group, lossless)
+            self._images = self.subscribe(kind, topic, put, group, lossless)
         self.matched()
 
     def _service_detector(self, settings: DetectorNodeSettings) -> ServiceDetector | None:
@@ -285,8 +296,14 @@ class DetectorNode(ProcessNode, LifecycleNodeMixin):
         return response
 
     def _identify(self, request: Identify.Request, response: Identify.Response) -> None:
+        cloud, settings = request.cloud, self._settings.current.cloud
+        located = bool(cloud.width or len(cloud.data))
+        if located:
+            organised_points(cloud)
         job = partial(self._queue.identify, request.image, request.expected or None)
-        response.coded_targets = self._worker.call(job)
+        answer = response.coded_targets = self._worker.call(job)
+        if located:
+            response.target_points, _ = points_of(answer, cloud, settings)
 
     def _reset(self, request: Trigger.Request, response: Trigger.Response) -> None:
         self._worker.call(self._queue.pipeline.stream.reset)

@@ -142,6 +142,7 @@ class Tally(Stamps):
     inactive: str = ''  # state of a managed node that is not active
     unasked: bool = False  # whether nobody subscribes to answers
     latency: float = 0.0  # from the arrival of the last image to its answer, s
+    settled: tuple[str, ...] = ()  # families, where all are looked for
     last: Identification = field(default_factory=lambda: Identification(()))
     clouds: CloudTally | None = None  # None while they are not subscribed to
 
@@ -212,6 +213,7 @@ class Diagnostics:
             'expected (N)': tally.last.expected,
             'N estimated': tally.last.estimated,
             'mirrored': tally.last.mirrored,
+            'settled families': ', '.join(tally.settled),
             'edge shift (px)': '' if shift is None else f'{shift:.2f}',
             'advice': tally.advice,
             'filter applied': used.applied,

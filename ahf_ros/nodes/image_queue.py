@@ -24,16 +24,16 @@ from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import CompressedImage, Image
 from std_msgs.msg import Header
 
-from ahf_ros.detectors.contract import Unavailable
 from ahf_ros.interchange.image_messages import nanoseconds
+from ahf_ros.interchange.target_messages import DROPPED
 from ahf_ros.msg import CodedTargetArray
 from ahf_ros.nodes.answers import Answers
 from ahf_ros.nodes.diagnostics import Tally, seconds
-from ahf_ros.nodes.pipeline import Pipeline, Stopping
+from ahf_ros.nodes.pipeline import STOPPING, Pipeline, Stopping
 from ahf_ros.nodes.process import LOG_PERIOD, ProcessNode
 from ahf_ros.nodes.settings import LOSSLESS
 from ahf_ros.settling import settled_families
-from ahf_ros.stream import Answer, Kind, Remark, message_frame, why_refused
+from ahf_ros.stream import STATUS, Answer, Kind, Remark, message_frame, why_refused
 from ahf_ros.text import printable
 
 SEGMENT = 64 * 2**20
@@ -47,6 +47,9 @@ Result = TypeVar('Result')
 ImageMessage: TypeAlias = Image | CompressedImage
 """The messages that images arrive in."""
 
+_REPLACED = 'a newer image took its place before its turn'
+_REPLACED_NEXT = 'the next image of its stack was replaced by a newer one'
+
 Take: TypeAlias = Callable[[], ImageMessage]
 """Returns the message that waited; called once."""
 
@@ -59,7 +62,12 @@ class _Waiting:
     take: Take
     pipeline: Pipeline
     arrived: float  # s of the monotonic clock
-    stamp: int  # ns
+    header: Header
+
+    @property
+    def stamp(self) -> int:
+        """Its stamp, ns."""
+        return nanoseconds(self.header)
 
     @property
     def lossless(self) -> bool:
@@ -68,6 +76,9 @@ class _Waiting:
 
 class ImageQueue:
     """Identifies the images of a node in the order of their arrival, and publishes the answers.
+
+    Every image has an answer, also one that is refused or dropped; that of a stack is for all of
+    its images.
 
     Every image of a lossless queue waits. Of other images, as many wait as a stack has: a newer
     one takes the place of the oldest, and a stack has no images on both sides of such a gap.
@@ -99,7 +110,19 @@ class ImageQueue:
     def discard(self) -> None:
         """Give up the images that wait."""
         self._worker.discard()
+        self.give_up('the node was cleaned up')
+
+    def give_up(self, why: str) -> None:
+        """Answer the images that wait with the reason why they are not identified.
+
+        The worker must have stopped.
+        """
+        waiting, last = self._waiting, self._last
         self._begin()
+        if last:
+            self._drop(last.pipeline, last.pipeline.stream.forget(), why)
+        for image in waiting:
+            self._drop(image.pipeline, (image.header,), why)
 
     def put(self, message: ImageMessage) -> None:
         """Let an image wait for its turn."""
@@ -107,24 +130,35 @@ class ImageQueue:
         pipeline = self.pipeline
         settings = pipeline.settings
         take: Take = [message].pop  # keeps nothing
-        stamp = nanoseconds(message.header)
+        header, given_up = message.header, ''
         if settings.queue == LOSSLESS:
             try:
                 take = self._messages.put(message, settings.queue_memory * 2**20)
             except ValueError as error:
-                self._tell(why_refused(error), stamp)
+                self._refuse(pipeline, why_refused(error, Kind.DROPPED, (header,)))
                 return
         with self._lock:
             arrived = time.monotonic()
-            image = _Waiting(next(self._numbers), take, pipeline, arrived, stamp)
+            image = _Waiting(next(self._numbers), take, pipeline, arrived, header)
             replaceable = [] if image.lossless else [it for it in self._waiting if not it.lossless]
             self._waiting.append(image)
             if len(replaceable) < settings.stacking.stack:
-                self._worker.append(self._identify_next)
+                if self._worker.append(self._identify_next).cancelled():
+                    self._waiting.remove(image)
+                    given_up = STOPPING
             else:  # it takes the turn of the oldest one
-                self._waiting.remove(replaceable[0])
+                image = replaceable[0]
+                self._waiting.remove(image)
                 self._tally.dropped += 1
                 self._tally.behind += 1
+                given_up = _REPLACED
+        if given_up:
+            self._drop(image.pipeline, (image.header,), given_up)
+
+    def refuse(self, header: Header, error: Exception) -> None:
+        """Answer an image that did not even become a message, with the reason."""
+        self._tally.received += 1
+        self._refuse(self.pipeline, why_refused(error, items=(header,)))
 
     def identify(self, message: ImageMessage, expected: int | None = None) -> CodedTargetArray:
         """Identify an image out of turn; called in the thread of the worker.
@@ -165,9 +199,11 @@ class ImageQueue:
         if last and last.pipeline is not image.pipeline:
             self._end(last, 'parameters changed')
         elif last and last.number != image.number - 1:
-            self._tally.dropped += stream.forget()
+            given_up = stream.forget()
+            self._tally.dropped += len(given_up)
+            self._drop(image.pipeline, given_up, _REPLACED_NEXT)
         self._overdue.cancel()
-        self._handle(image, stream.add(lambda: message_frame(image.take())))
+        self._handle(image, stream.add(lambda: message_frame(image.take()), image.header))
         if stream.waiting:
             self._expect(image.pipeline.settings.stack_timeout)
         with self._lock:
@@ -204,16 +240,15 @@ class ImageQueue:
 
     def _handle(self, image: _Waiting, said: Iterable[Answer[Header] | Remark]) -> None:
         """Publish the answers of a stream, and tell its remarks."""
-        try:
-            for it in said:
-                if isinstance(it, Remark):
-                    self._tell(it, image.stamp)
-                else:
-                    self._publish(it, image)
-        except Stopping:
-            return
-        except Unavailable as error:
-            self._tell(why_refused(error), image.stamp)
+        for it in said:
+            if not isinstance(it, Remark):
+                self._publish(it, image)
+            elif isinstance(it.error, Stopping):
+                self._drop(image.pipeline, it.items, STOPPING)
+            elif it.items:
+                self._refuse(image.pipeline, it)
+            else:
+                self._tell(it, image.stamp)
 
     def _publish(self, answer: Answer[Header], image: _Waiting) -> None:
         try:
@@ -225,6 +260,18 @@ class ImageQueue:
         except Exception as error:
             # No image may end the node.
             self._tell(why_refused(error), image.stamp)
+
+    def _refuse(self, pipeline: Pipeline, remark: Remark) -> None:
+        """Tell a remark on images that get no answer of a stream, and answer them with it."""
+        for header in remark.items:
+            self._tell(remark, nanoseconds(header))
+            status = STATUS[remark.kind]
+            self._answers.give_up(pipeline.unanswered(header, status, remark.text))
+
+    def _drop(self, pipeline: Pipeline, headers: Iterable[Header], why: str) -> None:
+        """Answer images that were not looked at."""
+        for header in headers:
+            self._answers.give_up(pipeline.unanswered(header, DROPPED, why))
 
     def _tell(self, remark: Remark, stamp: int) -> None:
         """Count and log a remark on an image with a stamp, ns."""

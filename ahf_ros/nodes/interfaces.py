@@ -68,11 +68,17 @@ _DETECTOR = _interfaces("""
 in image sensor_msgs/Image \
     mono, colour, Bayer, YUV422; 8 and 16 bits and floats; any step and byte order
 in image/compressed sensor_msgs/CompressedImage \
-    with `image_transport` compressed: JPEG, WebP, PNG of 8 and 16 bits
+    with `image_transport` compressed: JPEG, WebP, PNG of 8 and 16 bits, TIFF
+in image/zstd sensor_msgs/CompressedImage with `image_transport` zstd
+in image/ffmpeg ffmpeg_image_transport_msgs/FFMPEGPacket \
+    with `image_transport` ffmpeg: H.264, HEVC, AV1 and other video
 in camera_info sensor_msgs/CameraInfo with `undistort`
 in points sensor_msgs/PointCloud2 with `cloud`: organised, one point per pixel
-out coded_targets ahf_ros/CodedTargetArray one for every image, even if it is empty
+out coded_targets ahf_ros/CodedTargetArray \
+    one for every image, even if it is empty, refused or dropped
 out ~/detections vision_msgs/Detection2DArray with `detections`
+out ~/apriltag_detections apriltag_msgs/AprilTagDetectionArray \
+    with `apriltag_detections`: square markers, as apriltag_ros publishes them
 out ~/undistorted_targets ahf_ros/CodedTargetArray with `undistort`: in the rectified image
 out ~/target_points sensor_msgs/PointCloud2 with `cloud`: position and ID of every target
 out ~/target_labels visualization_msgs/MarkerArray \
@@ -84,7 +90,8 @@ out ~/filtered_image sensor_msgs/Image \
 out ~/annotations visualization_msgs/ImageMarker \
     outlines to lay over the image; only while somebody subscribes
 out /diagnostics diagnostic_msgs/DiagnosticArray once per second
-service ~/identify ahf_ros/srv/Identify one image, one answer, never dropped
+service ~/identify ahf_ros/srv/Identify \
+    one image, one answer, never dropped; positions of its targets where a cloud is given
 service ~/reset std_srvs/Trigger \
     forget what earlier images showed: filter, N that was estimated, families that were settled
 service ~/change_state lifecycle_msgs/ChangeState \

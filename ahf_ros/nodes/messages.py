@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import array
 import math
+import sys
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from types import ModuleType
@@ -29,8 +30,10 @@ from sensor_msgs.msg import Image, PointCloud2, PointField
 from std_msgs.msg import ColorRGBA, Header
 from visualization_msgs.msg import ImageMarker, Marker, MarkerArray
 
+from ahf_ros.codes.square import library_name
 from ahf_ros.drawing.overlay import DECODED_COLOUR, DOUBTFUL_COLOUR, Colour
 from ahf_ros.interchange.point_clouds import AXES, COVARIANCE, NUMBERS
+from ahf_ros.interchange.target_messages import has_corners
 from ahf_ros.localisation import Positions, labelled
 from ahf_ros.msg import CodedTarget, CodedTargetArray
 from ahf_ros.orientation.transform import Transform
@@ -66,6 +69,35 @@ def target_detections(answer: CodedTargetArray, types: ModuleType) -> object:
             detection.results = [types.ObjectHypothesisWithPose(hypothesis=hypothesis)]
         detections.append(detection)
     return types.Detection2DArray(header=answer.header, detections=detections)
+
+
+def apriltag_detections(answer: CodedTargetArray, types: ModuleType) -> object:
+    """Return the square markers of an answer as apriltag_ros publishes them, in their order.
+
+    They are an `apriltag_msgs.msg.AprilTagDetectionArray` with the header of the answer; `types`
+    is the module `apriltag_msgs.msg`, version 2 or newer. A tag has the name that its own library
+    gives the family. Coordinates are those of the answer: the AprilTag library, for which (0, 0)
+    is a corner of the first pixel, has half a pixel more. Cells that nobody looked at count as
+    right, with a margin of 0.
+    """
+    detections = []
+    for target in answer.targets:
+        if target.id == UNDECODED or not has_corners(target):
+            continue
+        known = math.isfinite(target.hamming)
+        detections.append(
+            types.AprilTagDetection(
+                family=library_name(target.family),
+                id=target.id,
+                hamming=round(target.hamming) if known else 0,
+                goodness=0.0,
+                decision_margin=target.decision_margin if known else 0.0,
+                centre=types.Point(x=target.x, y=target.y),
+                corners=[types.Point(x=x, y=y) for x, y in target.corners.reshape(4, 2).tolist()],
+                homography=target.homography,
+            )
+        )
+    return types.AprilTagDetectionArray(header=answer.header, detections=detections)
 
 
 def target_annotations(answer: CodedTargetArray) -> ImageMarker:
@@ -157,21 +189,24 @@ def cloud_message(points: np.ndarray, header: Header) -> PointCloud2:
 
 
 def image_message(image: np.ndarray, header: Header) -> Image:
-    """Return the message of an image, uint8.
+    """Return the message of an image, uint8 or, where it is gray, uint16.
 
-    Gray, shape (height, width), is sent as mono8; blue, green, red, (height, width, 3), as bgr8.
+    Gray, shape (height, width), is sent as mono8 or mono16; blue, green, red, (height, width, 3),
+    as bgr8.
     """
     height, width = image.shape[:2]
-    encoding, channels = ('mono8', 1) if image.ndim == 2 else ('bgr8', 3)
+    gray = 'mono8' if image.dtype == np.uint8 else 'mono16'
+    encoding, channels = (gray, 1) if image.ndim == 2 else ('bgr8', 3)
     # An ndarray assigned to `data` is checked value by value; an array of bytes is taken as it is.
-    data = array.array('B', bytes(image.size))
-    np.frombuffer(data, np.uint8).reshape(image.shape)[:] = image
+    data = array.array('B', bytes(image.nbytes))
+    np.frombuffer(data, image.dtype).reshape(image.shape)[:] = image
     return Image(
         header=header,
         height=height,
         width=width,
         encoding=encoding,
-        step=width * channels,
+        is_bigendian=sys.byteorder == 'big',
+        step=width * channels * image.itemsize,
         data=data,
     )
 

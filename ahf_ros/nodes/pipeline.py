@@ -14,7 +14,7 @@ from ahf_ros.advice import Adviser
 from ahf_ros.detectors import Detector, create_detector
 from ahf_ros.detectors.contract import Unavailable
 from ahf_ros.filtering.homomorphic import filtered
-from ahf_ros.interchange.target_messages import coded_target_array
+from ahf_ros.interchange.target_messages import coded_target_array, unanswered
 from ahf_ros.msg import CodedTargetArray
 from ahf_ros.nodes.settings import LOSSLESS, DetectorNodeSettings
 from ahf_ros.stream import Answer, Stream
@@ -120,8 +120,19 @@ class Pipeline:
 
     def message(self, answer: Answer[Header]) -> CodedTargetArray:
         """Return an answer as it is sent, with the header of its last image."""
-        found, header = answer.identification, answer.items[-1]
-        return coded_target_array(found, self._family, answer.stack.shape, header, msg)
+        return coded_target_array(
+            answer.identification,
+            self._family,
+            answer.stack.shape,
+            answer.items[-1],
+            msg,
+            reason=answer.note,
+            settled=answer.settled,
+        )
+
+    def unanswered(self, header: Header, status: str, reason: str) -> CodedTargetArray:
+        """Return what is sent of an image that was not identified."""
+        return unanswered(status, reason, self._family, header, msg)
 
     def filtered(self, answer: Answer[Header]) -> np.ndarray:
         """Return the filtered image in which the targets of an answer were identified."""

@@ -19,7 +19,7 @@ from std_msgs.msg import Header
 from ahf_ros.interchange.camera_info import Calibration, places_with_covariances
 from ahf_ros.interchange.coordinate_files import read_coordinates
 from ahf_ros.interchange.image_messages import nanoseconds
-from ahf_ros.interchange.target_messages import identification_from
+from ahf_ros.interchange.target_messages import identification_from, is_answered
 from ahf_ros.msg import CodedTargetArray
 from ahf_ros.nodes.diagnostics import PERIOD, PoseDiagnostics, PoseTally, publish_status
 from ahf_ros.nodes.messages import (
@@ -105,6 +105,8 @@ class PoseNode(ProcessNode):
         self._calibrations.put(message)
 
     def _on_targets(self, message: CodedTargetArray) -> None:
+        if not is_answered(message):  # the detector says why
+            return
         begin = time.monotonic()
         tally, settings = self._tally, self._settings.current
         tally.received += 1

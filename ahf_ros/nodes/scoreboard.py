@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ahf_ros.evaluation import line
 from ahf_ros.interchange.image_messages import nanoseconds
-from ahf_ros.interchange.target_messages import identification_from
+from ahf_ros.interchange.target_messages import identification_from, is_answered
 from ahf_ros.msg import CodedTargetArray
 from ahf_ros.nodes.parameters import ParameterSettings
 from ahf_ros.nodes.process import ProcessNode
@@ -38,7 +38,7 @@ class Scoreboard(ProcessNode):
     def _on_targets(self, message: CodedTargetArray) -> None:
         images = self._settings.current.images
         truth = self._truths.get(nanoseconds(message.header))
-        if truth is None or (images and self._count >= images):
+        if not is_answered(message) or truth is None or (images and self._count >= images):
             return
         self._count += 1
         words = line(identification_from(message), identification_from(truth).targets)

@@ -10,6 +10,7 @@ from importlib.util import find_spec
 from ahf_ros.cloud_settings import MAXIMUM_TOLERANCE, CloudSettings
 from ahf_ros.codes.families import families_of
 from ahf_ros.detectors import DETECTOR, detector_name
+from ahf_ros.extras import missing
 from ahf_ros.nodes.patience import CONTINUOUS, TRIGGERED, UNKNOWN
 from ahf_ros.registration_settings import RegistrationSettings, check_frame, unit_parameter
 from ahf_ros.session import create_identifier
@@ -20,6 +21,17 @@ from ahf_ros.text import printable, shown
 
 LATEST, LOSSLESS = 'latest', 'lossless'
 """What becomes of images that arrive while another one is being identified."""
+
+RAW, FFMPEG = 'raw', 'ffmpeg'
+IMAGE_TRANSPORTS = RAW, 'compressed', 'zstd', FFMPEG
+"""Names of image_transport for what images are sent as."""
+
+PACKAGES = {
+    'detections': 'vision_msgs',
+    'apriltag_detections': 'apriltag_msgs',
+    FFMPEG: 'ffmpeg_image_transport_msgs',
+}
+"""Which package has the messages that a setting asks for."""
 
 SERVICE = 'service'
 """Name of the detector that calls a service of another node."""
@@ -38,6 +50,15 @@ _NAMESPACE = re.compile(r'[A-Za-z_]\w*(/[A-Za-z_]\w*)*', re.ASCII)
 _FRAME = re.compile(r'[^\s/][^\s]*')
 
 
+def check_package(name: str, value: object, package: str, otherwise: str) -> None:
+    """Raise a ValueError if the package with the messages is not there that a setting asks for."""
+    if find_spec(package) is None:
+        raise ValueError(
+            f'{name} is {value!r} and the package {package} is not there, accepted without it is '
+            f'{otherwise}; ros-DISTRIBUTION-{package.replace("_", "-")} installs it'
+        )
+
+
 @dataclass(frozen=True, slots=True)
 class AnswerSettings:
     """Other forms in which answers are published, too."""
@@ -45,6 +66,11 @@ class AnswerSettings:
     detections: bool = parameter(
         False,
         'Whether to publish the targets on ~/detections, too, as vision_msgs/Detection2DArray.',
+    )
+    apriltag_detections: bool = parameter(
+        False,
+        'Whether to publish square markers on ~/apriltag_detections, too, as '
+        'apriltag_msgs/AprilTagDetectionArray.',
     )
     undistort: bool = parameter(
         False,
@@ -55,11 +81,9 @@ class AnswerSettings:
     def __post_init__(self) -> None:
         """Refuse values that are not accepted."""
         check_parameters(self)
-        if self.detections and find_spec('vision_msgs') is None:
-            raise ValueError(
-                'detections is True and the package vision_msgs is not there, accepted without '
-                'it is False; ros-DISTRIBUTION-vision-msgs installs it'
-            )
+        for name in ('detections', 'apriltag_detections'):
+            if getattr(self, name):
+                check_package(name, True, PACKAGES[name], 'False')
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,10 +126,11 @@ class DetectorNodeSettings:
         read_only=True,
     )
     image_transport: str = parameter(
-        'raw',
-        'raw: sensor_msgs/Image on image; compressed: CompressedImage on image/compressed, which '
-        'follows a remapped image.',
-        choices=('raw', 'compressed'),
+        RAW,
+        'raw: sensor_msgs/Image on image; compressed and zstd: CompressedImage on '
+        'image/compressed or image/zstd, which follow a remapped image; ffmpeg: video on '
+        'image/ffmpeg, which needs PyAV and ffmpeg_image_transport_msgs.',
+        choices=IMAGE_TRANSPORTS,
     )
     queue: str = parameter(
         LATEST,
@@ -185,6 +210,11 @@ class DetectorNodeSettings:
     def __post_init__(self) -> None:
         """Refuse values that are not accepted."""
         check_parameters(self)
+        if self.image_transport == FFMPEG:
+            others = f'one of {", ".join(it for it in IMAGE_TRANSPORTS if it != FFMPEG)}'
+            check_package('image_transport', FFMPEG, PACKAGES[FFMPEG], others)
+            if lost := missing('video'):
+                raise ValueError(f'image_transport is {FFMPEG!r}, accepted is {others}: {lost}')
         if self.service and not _SERVICE_NAME.fullmatch(self.service):
             raise ValueError(f'service is {self.service!r}, accepted is the name of a ROS service')
         if self.identification.detector == 'command' and not self.allow_programs:
@@ -373,13 +403,9 @@ class PoseNodeSettings:
                 'without / at its start'
             )
         for wanted, package, name, value in (
-            (self.detections, 'vision_msgs', 'detections', 'True'),
-            (self.tf != NONE, 'tf2_msgs', 'tf', repr(self.tf)),
-            (self.target_frames, 'tf2_msgs', 'target_frames', 'True'),
+            (self.detections, 'vision_msgs', 'detections', True),
+            (self.tf != NONE, 'tf2_msgs', 'tf', self.tf),
+            (self.target_frames, 'tf2_msgs', 'target_frames', True),
         ):
-            if wanted and find_spec(package) is None:
-                without = repr(NONE) if name == 'tf' else 'False'
-                raise ValueError(
-                    f'{name} is {value} and the package {package} is not there, accepted without '
-                    f'it is {without}; ros-DISTRIBUTION-{package.replace("_", "-")} installs it'
-                )
+            if wanted:
+                check_package(name, value, package, repr(NONE) if name == 'tf' else 'False')

@@ -31,6 +31,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
         answers = [it for it in reader.connections if it.msgtype == ANSWERS]
         for connection, _, data in reader.messages(answers):
             answer = reader.deserialize(data, connection.msgtype)
+            if getattr(answer, 'status', 0):  # not identified; older bags do not say so
+                print(f'{connection.topic}: {answer.reason}', file=sys.stderr)
+                continue
             stamp = f'{answer.header.stamp.sec}.{answer.header.stamp.nanosec:09}'
             images[connection.topic] += 1
             for target in answer.targets:

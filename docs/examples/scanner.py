@@ -5,16 +5,17 @@
     python scanner.py box.csv
 
 The second command writes the coordinates of the targets on two sides of the box, and makes a scan
-of two sides for every Enter, until it has been around. `ros2 bag record -a` keeps the scans,
-`ros2 bag play` repeats them.
+of two sides for every Enter, until it has been around, and for every call of its service, as of
+trigger.py. `ros2 bag record -a` keeps the scans, `ros2 bag play` repeats them.
 """
 
 from __future__ import annotations
 
 import array
 import sys
+import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -25,8 +26,10 @@ import numpy as np
 import rclpy
 from ahf_ros import SceneSettings, render
 from builtin_interfaces.msg import Time
+from rclpy.node import Node
 from sensor_msgs.msg import CameraInfo, Image, PointCloud2, PointField
 from std_msgs.msg import Header
+from std_srvs.srv import Trigger
 
 WIDTH, HEIGHT = 0.20, 0.24  # of a side of the box, m
 RESOLUTION = 5000.0  # of its texture, px/m
@@ -42,6 +45,8 @@ TOPICS = {
     '/color/image_color': Image,
 }
 """Topics in the order in which a scan is published."""
+NEEDED = '/points/xyz', '/color/image_color'  # without subscribers to these, a scan is for nobody
+PATIENCE = 30.0  # for them, s
 
 
 @dataclass(frozen=True)
@@ -187,21 +192,64 @@ def table() -> str:
     return '\n'.join(['id,x,y,z,unit', *rows, ''])
 
 
+class Scanner(Node):
+    """Publishes scans from all sides in turn, and waits for those who need them."""
+
+    def __init__(self) -> None:
+        super().__init__('zivid_camera')
+        self.number = 0
+        self.turn = threading.Lock()
+        self.made = {name: self.create_publisher(kind, name, 1) for name, kind in TOPICS.items()}
+        self.create_service(Trigger, 'capture', self.called)
+
+    def wait(self, topics: Iterable[str], limit: float) -> str:
+        """Return the first topic that nobody subscribes to within a limit, s; empty if none."""
+        end = time.monotonic() + limit
+        for topic in topics:
+            while not self.made[topic].get_subscription_count():
+                if time.monotonic() > end:
+                    return topic
+                time.sleep(0.05)
+        return ''
+
+    def capture(self) -> str:
+        """Publish the next scan; return why it is not published, empty if it is."""
+        with self.turn:
+            if topic := self.wait(NEEDED, PATIENCE):
+                return (
+                    f'nobody subscribes to {topic} within {PATIENCE:g} s: start rig.launch.py, '
+                    'and something that listens to what it publishes'
+                )
+            if topic := self.wait(TOPICS, PATIENCE / 10):
+                print(f'nobody subscribes to {topic}, as a pose node would: go on without')
+            of = scan(self.number % len(SEEDS))
+            self.number += 1
+            for name, message in messages(of, time.time_ns()):
+                self.made[name].publish(message)
+            return ''
+
+    def called(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        """Make a scan for who calls the service."""
+        response.message = self.capture()
+        response.success = not response.message
+        return response
+
+
 def main() -> None:
-    """Write the coordinates, and publish a scan for every line on the input."""
+    """Write the coordinates, and make a scan for every line on the input until around the box."""
     Path(sys.argv[1]).write_text(table(), encoding='utf-8')
     rclpy.init()
-    node = rclpy.create_node('zivid_camera')
-    publishers = {name: node.create_publisher(kind, name, 1) for name, kind in TOPICS.items()}
-    for number in range(len(SEEDS)):
-        input('Enter: next scan')
-        while not all(it.get_subscription_count() for it in publishers.values()):
-            time.sleep(0.1)
-        for topic, message in messages(scan(number), time.time_ns()):
-            publishers[topic].publish(message)
-    input('Enter: end')
-    node.destroy_node()
-    rclpy.shutdown()
+    node = Scanner()
+    threading.Thread(target=rclpy.spin, args=(node,), daemon=True).start()
+    try:
+        while node.number < len(SEEDS):
+            input('Enter: next scan')
+            if why := node.capture():
+                print(why)
+        input('Enter: end')
+    except (EOFError, KeyboardInterrupt):
+        pass
+    rclpy.try_shutdown()
 
 
 if __name__ == '__main__':

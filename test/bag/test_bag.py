@@ -262,7 +262,15 @@ def test_what_is_refused_is_named_and_the_others_go_on(
     errors = capfd.readouterr().err
     assert "/image at 1700000000.000000002 s: encoding is 'unheard of', accepted is" in errors
     assert '/image at 1700000000.000000003 s: ' in errors
-    assert [time for time, _ in bags.answers(tmp_path / 'out')] == [times[0], times[3]]
+    answers = bags.answers(tmp_path / 'out')
+    assert [time for time, _ in answers] == times
+    of = [it for _, it in answers]
+    assert [(len(it.targets) > 0, it.status, it.reason == '') for it in of] == [
+        (True, it.OK, True) if number in (0, 3) else (False, it.REJECTED, False)
+        for number, it in enumerate(of)
+    ]
+    assert of[1].reason.startswith("encoding is 'unheard of', accepted is")
+    assert repr(of[1].header) == repr(messages[1][3].header)
 
 
 def cut(path: Path, share: float) -> None:

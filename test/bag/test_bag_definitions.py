@@ -4,8 +4,21 @@ import pytest
 
 pytest.importorskip('rosbags', reason='rosbags is not installed')
 
-from ahf_ros.bag.definitions import CODED_TARGETS, message_types, typestore
-from ahf_ros.interchange.target_messages import coded_target_array
+from rosbags.interfaces import Connection, MessageDefinition, MessageDefinitionFormat
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+from ahf_ros.bag.definitions import (
+    CODED_TARGETS,
+    TypeStores,
+    definition_folder,
+    message_types,
+    typestore,
+)
+from ahf_ros.interchange.target_messages import (
+    coded_target_array,
+    identification_from,
+    is_answered,
+)
 from ahf_ros.target import UNDECODED, FilterState, Identification, Target
 
 FOUND = Identification(
@@ -40,6 +53,37 @@ def test_a_message_comes_back_as_it_was() -> None:
     assert message.targets[1].covariance.tolist() == [1e-4, 0.0, 0.0, 4e-4]
     assert message.filter.gamma_high == pytest.approx(2.7, abs=1e-6)
     assert message.edge_shift == -0.75
+
+
+def test_an_answer_of_an_older_bag_is_read_by_its_own_definition() -> None:
+    """Fields are added at the end, and a bag has the definition that it was written by."""
+    added = {'CodedTarget': '\n# Of square markers', 'CodedTargetArray': 'uint8 status'}
+    folder, old = definition_folder(), get_typestore(Stores.ROS2_JAZZY)
+    for name in ('CodedTarget', 'FilterState', 'CodedTargetArray'):
+        text = (folder / f'{name}.msg').read_text().split(added.get(name, '\0'))[0]
+        old.register(get_types_from_msg(text, f'ahf_ros/msg/{name}'))
+    store, new = typestore(), typestore().deserialize_cdr(serialized(FOUND), CODED_TARGETS)
+    fields = {name for name, _ in old.fielddefs[CODED_TARGETS][1]}
+    assert fields == {name for name, _ in store.fielddefs[CODED_TARGETS][1]} - {
+        *('status', 'reason', 'settled')
+    }
+    kinds = message_types(old)
+    targets = [
+        kinds.CodedTarget(
+            **{name: getattr(it, name) for name, _ in old.fielddefs['ahf_ros/msg/CodedTarget'][1]}
+        )
+        for it in new.targets
+    ]
+    written = kinds.CodedTargetArray(**{it: getattr(new, it) for it in fields - {'targets'}},
+                                     targets=targets)  # fmt: skip
+    text, _ = old.generate_msgdef(CODED_TARGETS, ros_version=2)
+    definition = MessageDefinition(MessageDefinitionFormat.MSG, text)
+    topic = Connection(1, '/old', CODED_TARGETS, definition, '', 1, None, None)
+    data = bytes(old.serialize_cdr(written, CODED_TARGETS))
+    read = TypeStores().deserialize(topic, data)
+    assert not hasattr(read, 'status')
+    assert is_answered(read)
+    assert identification_from(read) == identification_from(new)
 
 
 @pytest.mark.parametrize('found', [FOUND, Identification(())])

@@ -96,7 +96,7 @@ def test_what_does_not_belong_together_is_said_and_answered(phases, tmp_path):
         stacking=StackSettings(stack=3),
     )
     outcome = answer_bag(task, lambda done, total, remark: said.append(remark))
-    assert stamps(task.output) == [20, 30, 10]
+    assert stamps(task.output) == [20, 30, 50, 10]
     assert (outcome.images, outcome.refused) == (5, 1)
     assert said[:2] == ['', '']
     assert '2 of 3 images: the next image is 400 x 280 px, mono8, these are 400 x 300' in said[2]

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import struct
 import sys
+import zlib
 from collections.abc import Callable
 from types import SimpleNamespace
 from typing import Any
@@ -292,3 +294,37 @@ def compressed_images(draw: st.DrawFn) -> Fields:
 @given(compressed_images())
 def test_any_compressed_message_is_an_image_or_refused(fields):
     attempt(lambda message: decode_compressed(message).image, fields)
+
+
+def zstd(image: np.ndarray, encoding: str = 'mono16', cut: int = 0) -> SimpleNamespace:
+    """Return a message as zstd_image_transport sends it."""
+    height, width = image.shape
+    head = struct.pack('<2IB2I', height, width, 0, width * image.itemsize, len(encoding))
+    packer = zlib.compressobj(wbits=16 + zlib.MAX_WBITS)
+    packed = packer.compress(image.tobytes()) + packer.flush()
+    data = head + encoding.encode() + packed[: len(packed) - cut]
+    return SimpleNamespace(format='zstd', data=np.frombuffer(data, np.uint8))
+
+
+def test_images_of_zstd_image_transport_are_read() -> None:
+    image = np.arange(600, dtype='<u2').reshape(20, 30)
+    assert (decode_compressed(zstd(image)).image == image).all()
+    for message, error in (
+        (zstd(image, 'mono9'), "encoding is 'mono9', accepted is one of mono8"),
+        (zstd(image, cut=100), 'data has [0-9]+ bytes, accepted are at least 1200'),
+        (SimpleNamespace(format='zstd', data=b'0123'), 'data has 4 bytes, accepted are at least'),
+        (
+            SimpleNamespace(format='zstd', data=struct.pack('<2IB2I', 9, 9, 0, 9, 0) + b'none'),
+            'data of format zstd cannot be decoded',
+        ),
+        (
+            SimpleNamespace(format='zstd', data=struct.pack('<2IB2I', 2**31, 9, 0, 9, 0)),
+            'accepted are sides of at most',
+        ),
+        (
+            SimpleNamespace(format='zstd', data=struct.pack('<2IB2I', 9, 9, 0, 2**31, 0)),
+            'step is 2147483648, accepted are at most',
+        ),
+    ):
+        with pytest.raises(ValueError, match=error):
+            decode_compressed(message)

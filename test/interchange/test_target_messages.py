@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 pytest.importorskip('rclpy', reason='ROS 2 is not installed')
@@ -8,9 +9,14 @@ from rclpy.serialization import deserialize_message, serialize_message
 from std_msgs.msg import Header
 
 from ahf_ros import msg
-from ahf_ros.interchange.target_messages import coded_target_array, identification_from
+from ahf_ros.interchange.target_messages import (
+    coded_target_array,
+    identification_from,
+    is_answered,
+    unanswered,
+)
 from ahf_ros.msg import CodedTarget, CodedTargetArray
-from ahf_ros.target import UNDECODED, FilterState, Identification, Target
+from ahf_ros.target import UNDECODED, FilterState, Identification, SquareMarker, Target
 
 COVARIANCE = (1e-4, 0.0, 0.0, 4e-4)
 # Values that 32-bit numbers hold exactly.
@@ -47,6 +53,35 @@ def test_nothing_is_lost_on_the_way() -> None:
 def test_nothing_identified_is_a_message_too() -> None:
     sent = coded_target_array(Identification(()), 'aicon12', (10, 20), Header(), msg)
     assert identification_from(sent) == Identification(())
+
+
+def test_square_markers_keep_their_corners() -> None:
+    corners = ((10.0, 20.0), (30.0, 21.0), (31.0, 41.0), (9.0, 40.0))
+    for family in ('apriltag_36h11', 'aruco_4x4_50'):
+        marker = SquareMarker(
+            *(3, 3, 20.0, 30.5, 10.0, 9.5, 0.25, 1.0, COVARIANCE, family),
+            corners=corners,
+            hamming=2,
+            decision_margin=55.5,
+        )
+        found = Identification((FOUND.targets[1], marker))
+        sent = coded_target_array(found, family, (50, 60), Header(), msg)
+        received = deserialize_message(serialize_message(sent), CodedTargetArray)
+        assert identification_from(received).targets == found.targets
+        # Bottom left of the upright marker first, which is at (9, 40) where OpenCV prints it.
+        first = (30.0, 21.0) if family == 'apriltag_36h11' else (9.0, 40.0)
+        assert tuple(received.targets[1].corners[:2]) == first
+        assert np.isnan(received.targets[0].corners).all()
+    sent.targets[1].corners = np.zeros(8)  # as a program of others leaves them
+    assert type(identification_from(sent).targets[1]) is Target
+
+
+def test_an_image_that_was_not_identified_is_a_message_too() -> None:
+    sent = unanswered('DROPPED', 'too late', 'aicon12', Header(frame_id='camera'), msg)
+    assert (sent.status, sent.reason) == (CodedTargetArray.DROPPED, 'too late')
+    assert (sent.header.frame_id, sent.family, sent.width) == ('camera', 'aicon12', 0)
+    assert not is_answered(sent)
+    assert is_answered(CodedTargetArray())
 
 
 def test_message_and_record_mean_the_same_by_undecoded() -> None:

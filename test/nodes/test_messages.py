@@ -7,6 +7,7 @@ from functools import partial
 from types import SimpleNamespace
 from typing import Any
 
+import cv2
 import numpy as np
 import pytest
 
@@ -18,12 +19,15 @@ from std_msgs.msg import Header
 from visualization_msgs.msg import ImageMarker, Marker
 
 from ahf_ros import msg
+from ahf_ros.codes.square import marker
+from ahf_ros.detectors import create_detector
 from ahf_ros.interchange.point_clouds import COVARIANCE
 from ahf_ros.interchange.target_messages import coded_target_array
 from ahf_ros.localisation import Positions
 from ahf_ros.msg import CodedTarget, CodedTargetArray
 from ahf_ros.nodes.messages import (
     PosedTarget,
+    apriltag_detections,
     detections_message,
     image_message,
     pose_message,
@@ -66,6 +70,15 @@ FIELDS = {
     'Detection3D': 'std_msgs/Header header\nObjectHypothesisWithPose[] results\n'
     'BoundingBox3D bbox\nstring id',
     'Detection3DArray': 'std_msgs/Header header\nDetection3D[] detections',
+}
+
+
+# Nor is apriltag_msgs.
+TAGS = {
+    'Point': 'float64 x\nfloat64 y',
+    'AprilTagDetection': 'string family\nint32 id\nint32 hamming\nfloat32 goodness\n'
+    'float32 decision_margin\nPoint centre\nPoint[4] corners\nfloat64[9] homography',
+    'AprilTagDetectionArray': 'std_msgs/Header header\nAprilTagDetection[] detections',
 }
 
 
@@ -148,6 +161,8 @@ def store() -> Any:
     store = get_typestore(Stores.ROS2_JAZZY)
     for name, text in FIELDS.items():
         store.register(get_types_from_msg(text, f'vision_msgs/msg/{name}'))
+    for name, text in TAGS.items():
+        store.register(get_types_from_msg(text, f'apriltag_msgs/msg/{name}'))
     return store
 
 
@@ -201,6 +216,59 @@ def moved(of: Transform, error: np.ndarray) -> Transform:
     """Return a transform with a small error, as its covariance describes it."""
     turn = rotation_matrices(error[None, 3:])[0]
     return Transform(turn @ of.rotation, of.translation + error[:3], of.covariance)
+
+
+def tag(turn: int, number: int = 5) -> tuple[np.ndarray, np.ndarray]:
+    """Return an image of a tag turned by so many degrees, and its four corners.
+
+    They are from the bottom left one of the tag as its own library prints it, counter-clockwise.
+    """
+    print_of_opencv = marker('apriltag_36h11', number, 12)
+    low, high = 52 - 0.5, 52 + len(print_of_opencv) - 0.5
+    image = np.pad(np.rot90(print_of_opencv, 2), 52, constant_values=255)
+    middle = (len(image) - 1) / 2
+    matrix = cv2.getRotationMatrix2D((middle, middle), turn, 1.0)
+    image = cv2.warpAffine(image, matrix, image.shape, flags=cv2.INTER_AREA, borderValue=255)
+    corners = np.array([(low, high, 1), (high, high, 1), (high, low, 1), (low, low, 1)])
+    return cv2.GaussianBlur(image, (0, 0), 0.7), corners @ matrix.T
+
+
+@pytest.mark.parametrize('turn', [0, 75, 200])
+def test_corners_are_those_of_the_april_tag_library(turn: int, store: Any) -> None:
+    image, corners = tag(turn)
+    found = create_detector(family='apriltag_36h11')(image)
+    sent = coded_target_array(Identification(tuple(found)), '', image.shape, SCANNER, msg)
+    (target,) = sent.targets
+    assert target.corners.reshape(4, 2) == pytest.approx(corners, abs=0.05)
+    assert (target.hamming, target.decision_margin) == (0.0, pytest.approx(127, abs=2))
+    ideal = np.array([(-1, 1, 1), (1, 1, 1), (1, -1, 1), (-1, -1, 1), (0, 0, 1)], float)
+    x, y, scale = target.homography.reshape(3, 3) @ ideal.T
+    assert np.column_stack((x, y))[:4] / scale[:4, None] == pytest.approx(corners, abs=0.05)
+    assert (x[4], y[4]) == pytest.approx((target.x, target.y), abs=1e-6)
+
+    kinds = SimpleNamespace(**{name: store.types[f'apriltag_msgs/msg/{name}'] for name in TAGS})
+    array, name = apriltag_detections(sent, kinds), 'apriltag_msgs/msg/AprilTagDetectionArray'
+    (detection,) = store.deserialize_cdr(store.serialize_cdr(array, name), name).detections
+    assert (detection.family, detection.id, detection.hamming) == ('tag36h11', 5, 0)
+    assert [(it.x, it.y) for it in detection.corners] == list(
+        map(tuple, target.corners.reshape(4, 2).tolist())
+    )
+    assert detection.homography.tolist() == target.homography.tolist()
+
+    library = pytest.importorskip('pupil_apriltags')
+    (theirs,) = library.Detector('tag36h11', quad_decimate=1.0).detect(image)
+    assert (theirs.tag_id, theirs.hamming) == (5, 0)
+    # (0, 0) is a corner of a pixel there, and corners are less exact.
+    assert theirs.corners - 0.5 == pytest.approx(corners, abs=0.4)
+
+
+def test_what_is_no_square_marker_is_no_april_tag(store: Any) -> None:
+    kinds = SimpleNamespace(**{name: store.types[f'apriltag_msgs/msg/{name}'] for name in TAGS})
+    mixed = answer(SEEN, LOST)
+    assert np.isnan([*mixed.targets[0].corners, *mixed.targets[0].homography]).all()
+    assert math.isnan(mixed.targets[0].hamming)
+    mixed.targets.append(CodedTarget(id=1))  # as a program of others leaves it
+    assert apriltag_detections(mixed, kinds).detections == []
 
 
 def test_targets_in_space_are_detections(store: Any) -> None:

@@ -20,6 +20,7 @@ from visualization_msgs.msg import ImageMarker, Marker, MarkerArray
 from ahf_ros.interchange.point_clouds import COVARIANCE
 from ahf_ros.msg import CodedTargetArray
 from ahf_ros.nodes.messages import image_message
+from ahf_ros.srv import Identify
 from ahf_ros.synthetic.camera import Camera, tilted_camera
 from ahf_ros.synthetic.scene import Rendering, SceneSettings, render
 from support.detector import DetectorProcess, overrides
@@ -158,6 +159,25 @@ def test_every_target_has_its_position_whatever_comes_first(rig: Rig, cloud_firs
     assert (message.height, message.width, message.is_dense) == (1, len(answer.targets), False)
     assert_true(message)
     rig.graph.until(lambda: rig.told('targets with a position') == '5 of 6')
+
+
+def test_the_service_returns_positions_where_a_cloud_is_given(rig: Rig) -> None:
+    image = image_message(RENDERING.image, header())
+
+    def identified(cloud: PointCloud2) -> Identify.Response:
+        request = Identify.Request(image=image, cloud=cloud)
+        return rig.graph.call(Identify, '/own/detector/identify', request)
+
+    response = identified(cloud_message(SCANNED, image.header))
+    assert (response.success, response.message) == (True, '')
+    assert response.target_points.header == Header(stamp=image.header.stamp, frame_id=CLOUD_FRAME)
+    assert_true(response.target_points)
+    assert len(response.coded_targets.targets) == len(RENDERING.targets)
+    response = identified(PointCloud2())
+    assert (response.success, response.target_points) == (True, PointCloud2())
+    response = identified(cloud_message(SCANNED[:, :-1], image.header))
+    assert not response.success
+    assert response.message.startswith('cloud has 639 x 480 points, accepted is 640 x 480')
 
 
 def test_what_has_no_partner_is_counted(rig: Rig) -> None:

@@ -185,6 +185,8 @@ def test_the_families_of_a_stream_are_said_when_they_settle(graph: Any) -> None:
         [it.id for it in shown.targets]
     ] * 2
     assert {target.family for target in found[0].targets} == {'metashape12'}
+    assert [answer.settled for answer in found] == ['metashape12'] * 2
+    graph.until(lambda: detector.told('settled families') == 'metashape12')
     assert detector.process.end() == (0, '')
     said = [line for line in detector.process.log.splitlines() if 'families: ' in line]
     assert len(said) == 1

@@ -19,6 +19,7 @@ from ahf_ros.detectors.claims import Rivals, owners
 from ahf_ros.detectors.contract import FamilyDetector, moved_targets
 from ahf_ros.detectors.square.edges import fit_edges
 from ahf_ros.detectors.square.frames import Places, centres, side_lengths
+from ahf_ros.detectors.square.margins import decision_margins
 from ahf_ros.detectors.square.prints import lay_outlines, lay_prints
 from ahf_ros.detectors.square.quadrilaterals import find_quadrilaterals
 from ahf_ros.detectors.square.reading import MINIMUM_ODDS, read
@@ -146,6 +147,9 @@ class SquareDetector(FamilyDetector):
             fit = fit_edges(gray, _from_halves(gray, corners, ink), ink)
             fit = lay_prints(gray, fit, ink)
             places = _places(fit.corners, fit.covariance, fit.edge_shift)
+            shown = decision_margins(gray, fit.corners, ink)
+            for place, wrong, margin in zip(places, *(it.tolist() for it in shown), strict=True):
+                place |= {'hamming': wrong, 'decision_margin': margin}
             refined = moved_targets(refined, alike, places, fit.share > 0)
         return refined
 
