@@ -19,6 +19,8 @@ READY := $(VENV)/ready
 QUIET := --quiet --disable-pip-version-check
 PIP := $(BIN)/python -m pip install $(QUIET)
 export AHF_ROS_DISTRIBUTION := $(DISTRIBUTION)
+# Python compiles a module when it is first imported; pip would compile also what nobody imports.
+export PIP_COMPILE := 0
 
 # The site is built and reports are opened in a browser once, on Jazzy.
 COMMA := ,
