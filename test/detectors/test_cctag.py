@@ -22,24 +22,29 @@ def scene(family: str = 'cctag3', **changes: object) -> Rendering:
     return rendering(**SIZE | {'family': family} | changes)
 
 
+LIGHTS = [
+    ('cctag3', {}, 0.02),
+    (
+        'cctag3',
+        {'light': 'stripe', 'ambient': 0.3, 'dot_radius': 20.0, 'targets': 4, 'seed': 3},
+        0.008,
+    ),
+]
+SHAPES = [
+    ('cctag4', {}, 0.02),
+    ('cctag3', {'polarity': 'bright'}, 0.02),
+    ('cctag3', {'dot_radius': 10.0}, 0.03),
+    ('cctag3', {'dot_radius': 60.0, 'targets': 2}, 0.02),
+    ('cctag3', {'tilt': 40.0, 'dot_radius': 20.0, 'targets': 4}, 0.03),
+    ('cctag3', {'blur': 2.0, 'dot_radius': 30.0, 'targets': 3}, 0.03),
+    ('cctag3', {'edge_shift': 0.5}, 0.03),
+    ('cctag3', {'edge_shift': -0.5, 'dot_radius': 24.0, 'targets': 4}, 0.03),
+]
+
+
 @pytest.mark.parametrize(
     ('family', 'changes', 'limit'),
-    [
-        ('cctag3', {}, 0.02),
-        ('cctag4', {}, 0.02),
-        ('cctag3', {'polarity': 'bright'}, 0.02),
-        ('cctag3', {'dot_radius': 10.0}, 0.03),
-        ('cctag3', {'dot_radius': 60.0, 'targets': 2}, 0.02),
-        ('cctag3', {'tilt': 40.0, 'dot_radius': 20.0, 'targets': 4}, 0.03),
-        ('cctag3', {'blur': 2.0, 'dot_radius': 30.0, 'targets': 3}, 0.03),
-        ('cctag3', {'edge_shift': 0.5}, 0.03),
-        ('cctag3', {'edge_shift': -0.5, 'dot_radius': 24.0, 'targets': 4}, 0.03),
-        (
-            'cctag3',
-            {'light': 'stripe', 'ambient': 0.3, 'dot_radius': 20.0, 'targets': 4, 'seed': 3},
-            0.008,
-        ),
-    ],
+    [*LIGHTS, *(pytest.param(*it, marks=pytest.mark.lasting) for it in SHAPES)],
 )
 def test_targets_are_identified_where_they_are(family: str, changes: dict, limit: float) -> None:
     shown = scene(family, **changes)
@@ -50,6 +55,7 @@ def test_targets_are_identified_where_they_are(family: str, changes: dict, limit
     assert all(target.code == target.id and target.family == family for target in found)
 
 
+@pytest.mark.lasting
 def test_targets_are_read_out_of_focus() -> None:
     shown = scene(dot_radius=60.0, targets=4, width=760, height=640, seed=3)
     radii = np.hypot(*np.mgrid[-7:8, -7:8])
@@ -69,6 +75,7 @@ def test_small_targets_are_found_in_stripes(family: str) -> None:
     assert np.abs(errors(shown, found)).max() < 0.3
 
 
+@pytest.mark.lasting
 def test_the_growth_of_ink_is_reported() -> None:
     shown = scene(edge_shift=0.4, gamma=1.0, dot_radius=20.0, targets=3)
     found = create_detector(family='cctag3')(shown.image)
