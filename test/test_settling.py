@@ -138,7 +138,7 @@ def test_a_clear_image_settles_its_family_at_once_and_later_ones_cost_less(
     assert identifier.identify(image).targets == named.identify(image).targets
 
 
-@pytest.mark.parametrize('light', ['normal', 'stripe'])
+@pytest.mark.parametrize(('light', 'height'), [('normal', 600), ('stripe', 450)])
 @pytest.mark.parametrize(
     ('first', 'second'),
     [
@@ -149,9 +149,11 @@ def test_a_clear_image_settles_its_family_at_once_and_later_ones_cost_less(
         pytest.param('cct10', 'cctag3', marks=pytest.mark.lasting),
     ],
 )
-def test_a_family_that_appears_in_a_stream_is_found(first: str, second: str, light: str) -> None:
+def test_a_family_that_appears_in_a_stream_is_found(
+    first: str, second: str, light: str, height: int
+) -> None:
     size = {'gsi': 5, 'cctag3': 14}.get(second, 12)
-    half = replace(WALL, width=450, height=450, targets=4, light=light)
+    half = replace(WALL, width=450, height=height, targets=4, light=light)
     own = render(replace(half, family=first))
     more = replace(half, dot_radius=size, seed=5)
     other = render(replace(more, family=second))
