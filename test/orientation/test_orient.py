@@ -191,6 +191,7 @@ def test_the_same_network_gives_the_same_bits():
     assert np.array_equal(first.start.points, second.start.points, equal_nan=True)
 
 
+@pytest.mark.lasting
 def test_a_target_twice_in_a_photograph_is_set_aside():
     seen = taken(focal=FOCAL)
     observed = seen.network.observations
@@ -335,6 +336,7 @@ def test_targets_on_a_line_are_refused():
         orient(seen.network)
 
 
+@pytest.mark.lasting
 def test_who_watches_is_told_stages_photographs_and_iterations() -> None:
     network = taken(focal=FOCAL).network
     seen: list[Progress] = []
