@@ -226,7 +226,8 @@ def test_the_report_has_the_advice(tmp_path, capsys) -> None:
 def test_a_few_rings_in_each_of_several_images_are_told_together(tmp_path, capsys) -> None:
     file = tmp_path / 'mine.yaml'
     file.write_text('family: mine\nbits: 9\nband: [1.6, 2.4]\nwords: all\n')
-    images = [shown(family='mine', family_file=str(file), targets=4, seed=it) for it in range(6)]
+    mine = {'family': 'mine', 'family_file': str(file), 'targets': 4, 'width': 440, 'height': 330}
+    images = [shown(**mine, seed=it) for it in range(6)]
     assert [line for image in images for line in advice(image, DetectorSettings())] == []
     line = '24 dots with a band of 9 sectors that no known family has: `ahf learn-family`'
     line += ' describes it'

@@ -110,6 +110,7 @@ def test_every_reader_is_tested_on_damaged_files(folder: Path) -> None:
     assert not missing
 
 
+@pytest.mark.lasting
 def test_nothing_else_opens_files() -> None:
     found = set()
     for path in PACKAGE.rglob('*.py'):

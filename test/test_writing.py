@@ -102,6 +102,7 @@ def quick_path() -> Iterator[Path]:
         yield Path(folder)
 
 
+@pytest.mark.lasting
 @pytest.mark.parametrize('kill', [False, True])
 @pytest.mark.parametrize('kind', [networks, registrations, exports, files])
 def test_all_is_old_or_all_is_new_wherever_writing_fails(
@@ -261,6 +262,7 @@ def test_what_was_an_input_and_is_gone_keeps_no_place(tmp_path: Path) -> None:
     assert other.read_bytes() == b'output'
 
 
+@pytest.mark.lasting
 def test_nothing_else_writes_files() -> None:
     package = ROOT / 'ahf_ros'
     found = set()

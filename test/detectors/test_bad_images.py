@@ -108,6 +108,7 @@ def test_what_shows_no_target_is_left_alone(detector: str, family: str, make) ->
         assert found == []
 
 
+@pytest.mark.lasting
 @every_detector
 def test_one_target_many_times_is_no_error(detector: str, family: str) -> None:
     with warnings.catch_warnings():

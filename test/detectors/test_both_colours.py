@@ -13,7 +13,10 @@ from ahf_ros.synthetic.scene import SceneSettings
 from support.scenes import rendered
 
 
-@pytest.mark.parametrize(('family', 'dot_radius'), [('gsi', 4), ('dots', 8), ('cctag3', 24)])
+@pytest.mark.parametrize(
+    ('family', 'dot_radius'),
+    [('gsi', 4), ('dots', 8), pytest.param('cctag3', 24, marks=pytest.mark.lasting)],
+)
 def test_every_kind_keeps_both_colours_of_an_id(family: str, dot_radius: float) -> None:
     usual = dict(width=360, height=300, targets=2, seed=3, family=family, dot_radius=dot_radius)
     of = [rendered(SceneSettings(**usual, polarity=it)) for it in ('dark', 'bright')]

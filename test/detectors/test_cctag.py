@@ -17,32 +17,34 @@ from support.scenes import counted, errors, rendering
 
 SIZE = {'width': 560, 'height': 420, 'targets': 6, 'dot_radius': 14.0, 'seed': 2}
 
-LARGE = {'width': 640, 'height': 480}
-SOFT = {'width': 1000, 'height': 760}
-
 
 def scene(family: str = 'cctag3', **changes: object) -> Rendering:
     return rendering(**SIZE | {'family': family} | changes)
 
 
+LIGHTS = [
+    ('cctag3', {}, 0.02),
+    (
+        'cctag3',
+        {'light': 'stripe', 'ambient': 0.3, 'dot_radius': 20.0, 'targets': 4, 'seed': 3},
+        0.008,
+    ),
+]
+SHAPES = [
+    ('cctag4', {}, 0.02),
+    ('cctag3', {'polarity': 'bright'}, 0.02),
+    ('cctag3', {'dot_radius': 10.0}, 0.03),
+    ('cctag3', {'dot_radius': 60.0, 'targets': 2}, 0.02),
+    ('cctag3', {'tilt': 40.0, 'dot_radius': 20.0, 'targets': 4}, 0.03),
+    ('cctag3', {'blur': 2.0, 'dot_radius': 30.0, 'targets': 3}, 0.03),
+    ('cctag3', {'edge_shift': 0.5}, 0.03),
+    ('cctag3', {'edge_shift': -0.5, 'dot_radius': 24.0, 'targets': 4}, 0.03),
+]
+
+
 @pytest.mark.parametrize(
     ('family', 'changes', 'limit'),
-    [
-        ('cctag3', {}, 0.02),
-        ('cctag4', {}, 0.02),
-        ('cctag3', {'polarity': 'bright'}, 0.02),
-        ('cctag3', {'dot_radius': 10.0}, 0.03),
-        ('cctag3', {'dot_radius': 60.0, 'targets': 2}, 0.02),
-        ('cctag3', {'tilt': 40.0, 'dot_radius': 20.0, 'targets': 4}, 0.03),
-        ('cctag3', {'blur': 2.0, 'dot_radius': 30.0, 'targets': 8, **SOFT}, 0.03),
-        ('cctag3', {'edge_shift': 0.5}, 0.03),
-        ('cctag3', {'edge_shift': -0.5, 'dot_radius': 24.0, 'targets': 4}, 0.03),
-        (
-            'cctag3',
-            {'light': 'stripe', 'ambient': 0.3, 'dot_radius': 20.0, **LARGE, 'seed': 3},
-            0.008,
-        ),
-    ],
+    [*LIGHTS, *(pytest.param(*it, marks=pytest.mark.lasting) for it in SHAPES)],
 )
 def test_targets_are_identified_where_they_are(family: str, changes: dict, limit: float) -> None:
     shown = scene(family, **changes)
@@ -53,6 +55,7 @@ def test_targets_are_identified_where_they_are(family: str, changes: dict, limit
     assert all(target.code == target.id and target.family == family for target in found)
 
 
+@pytest.mark.lasting
 def test_targets_are_read_out_of_focus() -> None:
     shown = scene(dot_radius=60.0, targets=4, width=760, height=640, seed=3)
     radii = np.hypot(*np.mgrid[-7:8, -7:8])
@@ -72,6 +75,7 @@ def test_small_targets_are_found_in_stripes(family: str) -> None:
     assert np.abs(errors(shown, found)).max() < 0.3
 
 
+@pytest.mark.lasting
 def test_the_growth_of_ink_is_reported() -> None:
     shown = scene(edge_shift=0.4, gamma=1.0, dot_radius=20.0, targets=3)
     found = create_detector(family='cctag3')(shown.image)
@@ -99,6 +103,7 @@ def test_targets_are_read_where_ink_has_grown_by_much_of_a_ring() -> None:
     assert counted(shown, create_detector(family='cctag3')(shown.image)) == (6, 0, 0)
 
 
+@pytest.mark.lasting
 def test_both_families_are_read_in_one_search() -> None:
     three, four = (scene(family, width=360, height=280, targets=3) for family in CCTAG_NAMES)
     both = np.hstack([three.image, four.image])
@@ -117,6 +122,7 @@ def test_both_families_are_read_in_one_search() -> None:
     assert alone == [it for it in found if it.family == 'cctag4']
 
 
+@pytest.mark.lasting
 def test_refinement_finds_the_place_again() -> None:
     shown = scene()
     detector = create_detector(family='cctag3')
@@ -138,6 +144,7 @@ def test_images_without_circles_have_no_targets() -> None:
         assert create_detector(family='cctag3, cctag4', **bounds)(slope) == []
 
 
+@pytest.mark.lasting
 def test_texture_is_read_no_longer_than_it_may_have_a_target(monkeypatch) -> None:
     read: list[int] = []
 

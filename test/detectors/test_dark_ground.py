@@ -50,6 +50,7 @@ def test_targets_are_read_whose_dark_ground_ends() -> None:
     assert sorted(found) == numbers
 
 
+@pytest.mark.lasting
 @pytest.mark.parametrize(
     ('light', 'radius', 'least'), [('stripe 0.12', 6, 44), ('fine_stripe 0.12', 10, 46)]
 )

@@ -140,6 +140,7 @@ def test_few_targets_and_images_without_any_are_no_family() -> None:
     assert len(find_bands([], DetectorSettings()).size) == 0
 
 
+@pytest.mark.lasting
 @needs_photographs
 def test_the_family_of_photographs() -> None:
     (found,) = learnt(*map(read_image, sorted(PANEL.glob('*.png'))[:4]))

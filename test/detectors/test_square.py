@@ -155,6 +155,7 @@ def plate(height: int) -> np.ndarray:
     return cv2.GaussianBlur(page, (0, 0), 0.7)
 
 
+@pytest.mark.lasting
 def test_hardly_any_letter_with_round_corners_is_a_marker():
     """Of 66, four are where a quarter of the image shows no corner to be round."""
     detect = create_detector(family='aruco_original')
@@ -285,6 +286,7 @@ def test_markers_of_another_dictionary_are_not_seen():
     assert create_detector(family='aruco_7x7_50')(shown.image) == []
 
 
+@pytest.mark.lasting
 def test_the_filter_finds_markers_that_stripes_hide(detect):
     shown = scene(light='stripe', ambient=0.1, seed=4)
     without = score(shown, detect(shown.image))

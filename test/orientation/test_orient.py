@@ -76,7 +76,7 @@ def error(solution, truth: np.ndarray) -> float:
 
 
 @pytest.mark.parametrize('depth', [0.0, 0.3])
-@pytest.mark.parametrize('focal', [None, FOCAL])
+@pytest.mark.parametrize('focal', [pytest.param(None, marks=pytest.mark.lasting), FOCAL])
 def test_nothing_but_ids_orients_a_network(depth: float, focal: float | None):
     seen = taken(depth=depth, focal=focal)
     (solution,) = orient(seen.network)
@@ -117,6 +117,7 @@ def test_the_frame_is_that_of_the_principal_axes():
     assert (solution.start.positions[:, 2] > 0).all()
 
 
+@pytest.mark.lasting
 def test_a_fisheye_lens_is_fitted():
     seen = taken(count=8, focal=1000.0, number=60)
     network = seen.network
@@ -190,6 +191,7 @@ def test_the_same_network_gives_the_same_bits():
     assert np.array_equal(first.start.points, second.start.points, equal_nan=True)
 
 
+@pytest.mark.lasting
 def test_a_target_twice_in_a_photograph_is_set_aside():
     seen = taken(focal=FOCAL)
     observed = seen.network.observations
@@ -267,6 +269,7 @@ def zooming(zooms: Sequence[float]):
     return photographed(points, rotations, positions, (camera,), of, calibrations, random), points
 
 
+@pytest.mark.lasting
 def test_another_zoom_gets_a_camera_of_its_own():
     seen, points = zooming((1, 1, 1, 1.2, 1.2, 1, 1, 1))
     (solution,) = orient(seen.network)
@@ -333,6 +336,7 @@ def test_targets_on_a_line_are_refused():
         orient(seen.network)
 
 
+@pytest.mark.lasting
 def test_who_watches_is_told_stages_photographs_and_iterations() -> None:
     network = taken(focal=FOCAL).network
     seen: list[Progress] = []
