@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
+from typing import ClassVar
 
 import numpy as np
 
@@ -66,6 +67,7 @@ class RingDetector:
     settings: DetectorSettings
     expected: frozenset[int] = frozenset()
     contested: bool = False
+    contrast: ClassVar[int] = 1  # see `Searching`
 
     @property
     def name(self) -> str:
@@ -129,7 +131,7 @@ def hypotheses_in(
 ) -> Hypotheses:
     """Find the dots and words in an image pyramid; see `find_hypotheses`."""
     found = read_pyramid(pyramid, settings, expected, PROPOSALS)
-    for part in faint_parts(pyramid.gray):
+    for part in faint_parts(pyramid.image):
         seen = read_image(part.gray, settings, expected, (propose_whole,))
         seen = seen.select(seen.certain)
         seen = replace(seen, frames=frame.translated(seen.frames, part.x, part.y))
@@ -200,15 +202,17 @@ def read_pyramid(
     described: Sequence[Family] = settings.codes(Family)
     families, polarities = described, settings.polarities
     shown = list(families if len(families) == 1 else shown)
-    images = (pyramid.gray, *pyramid.halves)
+    images = pyramid.images
     nothing = Hypotheses.unread(NO_FITS, families[0])
     seen = _Seen((nothing,), Explained.by(nothing))
     measured: list[tuple[Octave, Fit]] = []
     every = settings.report_undecoded
     for octave in octaves(pyramid, *settings.radii):
-        part, fits = octave.pyramid.gray, [NO_FITS]
+        fits = [NO_FITS]
         for propose in proposals:
+            part = None  # proposals take memory of their own
             proposed = propose(octave, polarities, seen.explained)
+            part = octave.pyramid.gray
             proposed = with_rims(proposed, families, octave.radii[0])
             dots = measure_dots(part, proposed, covariances=every)
             families = with_measured_bands(part, dots, families)
