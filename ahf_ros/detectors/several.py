@@ -122,9 +122,10 @@ class SeveralDetector:
             if nothing or left.min() == left.max():  # all that there was is painted over
                 results.append([])
                 continue
-            if together and (pyramid is None or pyramid.contrast != part.contrast):
-                pyramid = None  # which takes more memory than all else
-                pyramid = self._pyramid(left, part.contrast)
+            if shared and isinstance(part, Searching):
+                if pyramid and pyramid.contrast != part.contrast:
+                    pyramid = None  # before there is another one: it takes much memory
+                pyramid = pyramid or self._pyramid(left, part.contrast)
             if pyramid and isinstance(part, Explaining):
                 found, dots = part.explain(pyramid)
                 dots = None if self.settings.report_undecoded else dots

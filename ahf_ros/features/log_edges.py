@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import cv2
 import numpy as np
@@ -36,7 +37,9 @@ class LogEdges:
         """Return the edge pixels of all parts of one image."""
         if len(parts) == 1:
             return parts[0]
-        lists = {name: np.concatenate([getattr(it, name) for it in parts]) for name in _LISTED}
+        lists: dict[str, Any] = {
+            name: np.concatenate([getattr(it, name) for it in parts]) for name in _LISTED
+        }
         return replace(parts[0], **lists)
 
     def select(self, which: np.ndarray | slice) -> LogEdges:

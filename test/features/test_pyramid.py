@@ -7,7 +7,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from ahf_ros.features.log_edges import LOG_SCALE, find_edges
+from ahf_ros.features import log_edges
+from ahf_ros.features.log_edges import LOG_SCALE, LogEdges, edges_in_bands, find_edges
 from ahf_ros.features.pyramid import halved, image_pyramid, log_image, octaves
 from ahf_ros.imaging.logarithm import LOG_OFFSET
 
@@ -86,3 +87,33 @@ def test_edges_lie_on_steps_and_point_to_the_bright_side():
     assert set(edges.x) <= {40, 41}
     assert edges.unit_x == pytest.approx(1, abs=1e-6)
     assert edges.unit_y == pytest.approx(0, abs=1e-6)
+
+
+def test_edges_of_large_images_are_listed_in_bands(monkeypatch: pytest.MonkeyPatch) -> None:
+    log = log_image(IMAGE)
+    whole = find_edges(log).curved(6.0)
+    monkeypatch.setattr(log_edges, '_BAND', 70 * log.shape[1])
+    monkeypatch.setattr(log_edges, '_PART', 999)
+    bands = [*edges_in_bands(log)]
+    parts = LogEdges.joined(bands).curved(6.0)
+    assert len(bands) == 5
+    assert 1000 < len(whole.x) < len(find_edges(log).x)
+    for name in ('x', 'y', 'unit_x', 'unit_y', 'strength'):
+        assert np.array_equal(getattr(whole, name), getattr(parts, name))
+
+
+@pytest.mark.parametrize('contrast', [2, 3])
+def test_contrast_multiplies_the_steps_of_a_logarithm(contrast: int) -> None:
+    (multiplied,) = edges_in_bands(contrast * log_image(IMAGE))
+    (edges,) = edges_in_bands(log_image(IMAGE), contrast)
+    assert len(edges.x) > 1000
+    assert np.array_equal(edges.marked, multiplied.marked)
+    assert np.array_equal(edges.strength, multiplied.strength)
+
+
+def test_gray_values_are_those_of_the_image():
+    for image in (IMAGE, IMAGE.astype(np.float32)):
+        pyramid = image_pyramid(image, 60.0)
+        assert pyramid.gray.dtype == np.float32
+        assert np.array_equal(pyramid.gray, IMAGE)
+        assert pyramid.images[0] is image
