@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ahf_ros.extras import need
+from ahf_ros.extras import missing, need
 from ahf_ros.imaging.headers import read_header
 from ahf_ros.opening import Most, opened, reader
 
@@ -46,6 +46,10 @@ def read_exif(path: str | Path) -> tuple[Exif, tuple[int, int]]:
     need('orient', 'PIL')
     from PIL import Image, UnidentifiedImageError
 
+    if not missing('heic'):
+        from pillow_heif import register_heif_opener
+
+        register_heif_opener()
     try:
         with opened(path, Most.IMAGE) as file, warnings.catch_warnings():
             warnings.simplefilter('ignore')  # large images, damaged fields

@@ -11,7 +11,9 @@ import cv2
 import numpy as np
 
 from ahf_ros.deprecation import deprecated_arguments
+from ahf_ros.extras import missing
 from ahf_ros.imaging.headers import UPRIGHT, read_header
+from ahf_ros.imaging.heic import ENDINGS, decoded_heic
 from ahf_ros.imaging.image import check_size, without_gaps
 from ahf_ros.imaging.whole import decoded
 from ahf_ros.opening import Most, read_bytes, reader
@@ -21,10 +23,11 @@ SUFFIXES = ('.bmp', '.jpeg', '.jpg', '.png', '.tif', '.tiff')
 """Endings of the image files that are tested; others are tried."""
 
 _LAST_ORIENTATION = 8
+_HEIC = 'HEIC'
 _OTHERS = tuple(
     (kind, re.compile(begin, re.DOTALL))
     for kind, begin in (
-        ('HEIC', rb'....ftyp(hei|hev|mif1|msf1)'),
+        (_HEIC, rb'....ftyp(hei|hev|mif1|msf1)'),
         ('AVIF', rb'....ftypavi'),
         ('JPEG XL', rb'\xff\x0a|\0\0\0\x0cJXL '),
         ('JPEG 2000', rb'\0\0\0\x0cjP  |\xff\x4f\xff\x51'),
@@ -35,6 +38,11 @@ _OTHERS = tuple(
 
 _ACCEPTED = f'accepted is one of {", ".join(SUFFIXES)}'
 _ADVICE = f'{_ACCEPTED}: convert it in full size to 16-bit TIFF or PNG, without lens corrections'
+
+
+def image_suffixes() -> tuple[str, ...]:
+    """Return the endings of the files that are taken for images: of HEIC where that is read."""
+    return SUFFIXES if missing('heic') else (*SUFFIXES, *ENDINGS)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -130,6 +138,11 @@ def _decoded(content: bytes, name: str) -> NotedImage:
     """Return an encoded image as its pixels are stored."""
     if not content:
         raise ValueError(f'{name} is empty, accepted is an image')
+    kind = next((kind for kind, begin in _OTHERS if begin.match(content)), '')
+    if kind == _HEIC and not missing('heic'):
+        pixels, count = decoded_heic(content, name)
+        note = f'{name} has {count} images, the main one is read' if count > 1 else ''
+        return NotedImage(pixels, note=note)
     header = read_header(content)
     if header.raw:
         raise ValueError(f'{name} is a raw image, {_ADVICE}')
@@ -146,8 +159,9 @@ def _decoded(content: bytes, name: str) -> NotedImage:
         raise ValueError(f'{name} cannot be decoded: {error.err}') from error
     if image is None:
         what = f'is damaged: {damage}' if damage else 'is not an image, or is damaged'
-        if kind := next((kind for kind, begin in _OTHERS if begin.match(content)), ''):
-            raise ValueError(f'{name} is {kind}, {_ADVICE}')
+        if kind:
+            more = f'; {missing("heic")}' if kind == _HEIC else ''
+            raise ValueError(f'{name} is {kind}, {_ADVICE}{more}')
         raise ValueError(f'{name} {what}; {_ACCEPTED}')
     note = f'{name} has {header.pages} pages, the first is read' if header.pages > 1 else ''
     return NotedImage(without_gaps(image), header.orientation, note, damage)
