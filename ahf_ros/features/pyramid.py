@@ -19,6 +19,9 @@ from ahf_ros.imaging.logarithm import LOG_OFFSET
 MAXIMUM_RADIUS = 11.2
 """Largest radius of a dot that is voted for on one level, px; larger ones take a higher level."""
 
+MINIMUM_ASPECT = 0.2
+"""Ratio of the axes of a dot, at the least."""
+
 _OCTAVE_LEVELS = 3  # of the halves in which the dots of an octave are voted for
 _ROWS = 32  # of an image that are converted at a time, which stay in the cache
 _ABOVE, _SLACK = 1.01, 1.03  # of the bounds of octaves, which overlap by less than votes do
@@ -71,9 +74,11 @@ def image_pyramid(gray: np.ndarray, max_radius: float, contrast: int = 1) -> Ima
     """Return the pyramid of an image, uint8 or float32 from 0 to 255, to find dots in.
 
     The largest radius of a dot, px, decides how often the image is halved. No dot is larger than
-    the image. Edges are those of so many times the contrast.
+    the image, nor does a narrow image show one flatter than `MINIMUM_ASPECT`. Edges are those of
+    so many times the contrast.
     """
-    largest = min(max_radius, max(gray.shape) / 2)
+    narrow, wide = sorted(gray.shape)
+    largest = min(max_radius, wide / 2, narrow / 2 / MINIMUM_ASPECT)
     levels = max(1, ceil(log2(largest / MAXIMUM_RADIUS)))
     images = halved(gray, levels)
     logs = tuple(log_image(level, contrast) for level in images)

@@ -9,25 +9,28 @@ import pytest
 
 from ahf_ros.features import log_edges
 from ahf_ros.features.log_edges import LOG_SCALE, LogEdges, edges_in_bands, find_edges
-from ahf_ros.features.pyramid import halved, image_pyramid, log_image, octaves
+from ahf_ros.features.pyramid import MINIMUM_ASPECT, halved, image_pyramid, log_image, octaves
 from ahf_ros.imaging.logarithm import LOG_OFFSET
 
 IMAGE = np.random.default_rng(0).integers(0, 256, (300, 1700)).astype(np.uint8)
 
 
-def bounds(low: float, high: float) -> list[tuple[float, float]]:
+def bounds(low: float, high: float, image: np.ndarray = IMAGE) -> list[tuple[float, float]]:
     """Return the radii of the octaves, px of the image."""
-    pyramid = image_pyramid(IMAGE, high)
+    pyramid = image_pyramid(image, high)
     return [
         (it.radii[0] * 2**it.level, it.radii[1] * 2**it.level)
         for it in octaves(pyramid, low, high)
     ]
 
 
-def test_every_radius_up_to_half_of_the_image_is_in_an_octave():
-    every = bounds(4.0, 1e4)
+@pytest.mark.parametrize('shape', [(300, 1700), (900, 1700), (1700, 900), (17, 1700)])
+def test_every_radius_of_a_dot_that_fits_into_the_image_is_in_an_octave(shape: tuple[int, int]):
+    image = np.resize(IMAGE, shape)
+    every = bounds(4.0, 1e4, image)
     assert every[0][0] == 4
-    assert every[-1][1] >= IMAGE.shape[1] / 2
+    largest = min(max(shape), min(shape) / MINIMUM_ASPECT) / 2
+    assert largest <= every[-1][1] < max(4 * largest, 93)
     for (_, end), (start, _) in pairwise(every):
         assert 0.9 * end < start < end
 
