@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import struct
-from collections.abc import Callable, Generator, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator
 from contextlib import suppress
 from io import BytesIO
 from pathlib import Path
@@ -15,7 +15,7 @@ import zstandard
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import EndOfFile
 from mcap.opcode import Opcode
-from mcap.records import Channel, Chunk, McapRecord
+from mcap.records import Channel, Chunk, ChunkIndex, McapRecord
 from mcap.stream_reader import StreamReader, breakup_chunk
 
 from ahf_ros.text import printable
@@ -37,13 +37,16 @@ def seconds(timestamp: int) -> str:
     return f'{"-" if timestamp < 0 else ""}{whole}.{part:09}'
 
 
-def read_records(path: Path, most: int, leave_out: Callable[[str], None]) -> Iterator[McapRecord]:
+def read_records(
+    path: Path, most: int, leave_out: Callable[[str], None], unchecked: Callable[[], None]
+) -> Iterator[McapRecord]:
     """Yield the records of a file, and those in its chunks, up to its end or to a damage.
 
-    A record may have `most` bytes. A chunk that is there again is left out and named. Of a cut
-    chunk, the whole records are yielded; then a `CutFile` is raised. A damage raises anything.
+    A record may have `most` bytes. A chunk that is there again is left out and named, and one
+    without a checksum makes a call of `unchecked`. Of a cut chunk, the whole records are yielded;
+    then a `CutFile` is raised. A damage raises anything.
     """
-    reading = _Reading(most, leave_out)
+    reading = _Reading(most, leave_out, unchecked)
     with path.open('rb') as file:
         where = yield from reading.records(file)
     if where:
@@ -53,9 +56,10 @@ def read_records(path: Path, most: int, leave_out: Callable[[str], None]) -> Ite
 class _Reading:
     """What is known of a file that is being read."""
 
-    def __init__(self, most: int, leave_out: Callable[[str], None]) -> None:
-        self._most = most
-        self._leave_out = leave_out
+    def __init__(
+        self, most: int, leave_out: Callable[[str], None], unchecked: Callable[[], None]
+    ) -> None:
+        self._most, self._leave_out, self._unchecked = most, leave_out, unchecked
         self._topics: dict[int, str] = {}
         self._chunks: set[tuple[int, ...]] = set()
 
@@ -90,6 +94,8 @@ class _Reading:
                 self._leave_out(f'a chunk with messages {_span(*times)}, which is there again')
                 return
             self._chunks.add(known)
+            if not record.uncompressed_crc:
+                self._unchecked()
             parts = breakup_chunk(record, validate_crc=True)
         for part in parts:
             if isinstance(part, Channel):
@@ -124,6 +130,12 @@ def _stored(chunk: bytes, size: int) -> bytes:
         with suppress(zstandard.ZstdError):
             return zstandard.ZstdDecompressor().stream_reader(stored).read(size)
     return b'' if compression else stored[:size]
+
+
+def has_checksums(file: IO[bytes], chunks: Iterable[ChunkIndex]) -> bool:
+    """Return whether all chunks of a file have a checksum."""
+    places = (it.chunk_start_offset + _RECORD.size + _CHECKSUM_AT for it in chunks)
+    return all(file.seek(it) and any(file.read(4)) for it in places)
 
 
 def add_checksums(path: Path) -> None:

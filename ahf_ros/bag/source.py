@@ -29,7 +29,7 @@ from rosbags import rosbag1, rosbag2
 from rosbags.interfaces import Connection, ConnectionExtRosbag1, ConnectionExtRosbag2
 
 from ahf_ros.bag.definitions import COMPRESSED_IMAGE, IMAGE, TypeStores, as_ros2
-from ahf_ros.bag.mcap_records import CutFile, read_records, seconds
+from ahf_ros.bag.mcap_records import CutFile, has_checksums, read_records, seconds
 from ahf_ros.opening import parsing, read_text
 from ahf_ros.parsed_yaml import parsed_yaml
 from ahf_ros.text import counted, printable, reason_of
@@ -115,6 +115,8 @@ class Source(ExitStack):
         Types of the messages.
     left_out : dict of str to None
         What a copy does not have besides messages that are missing, as an ordered set.
+    checked : bool
+        Whether all chunks of MCAP files have a checksum, by which damage in them is noticed.
     """
 
     def __init__(self, path: Path) -> None:
@@ -124,6 +126,7 @@ class Source(ExitStack):
         self.connections: list[Connection] = []
         self.foreign: list[Connection] = []
         self.left_out: dict[str, None] = {}
+        self.checked = True
         self.stores = TypeStores()
         self._files: list[_File] = []
         self._unopened: list[str] = []
@@ -327,6 +330,7 @@ class Source(ExitStack):
             if summary is not None and summary.statistics is not None:
                 self._leave_out(summary.attachment_indexes, 'attachment')
                 self._leave_out(summary.metadata_indexes, 'metadata')
+                self.checked &= has_checksums(file, summary.chunk_indexes)
                 chunks = {_extent(it) for it in summary.chunk_indexes}
                 return bool(chunks) and len(chunks) == len(summary.chunk_indexes)
         return False
@@ -395,8 +399,11 @@ class Source(ExitStack):
         def leave_out(what: str) -> None:
             self.left_out[f'{path.name}: {what}'] = None
 
+        def unchecked() -> None:
+            self.checked = False
+
         try:
-            for record in read_records(path, MAXIMUM_SIZE, leave_out):
+            for record in read_records(path, MAXIMUM_SIZE, leave_out, unchecked):
                 yield record
                 time = record.log_time if isinstance(record, McapMessage) else time
         except Exception as error:

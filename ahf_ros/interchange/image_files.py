@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import struct
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -12,7 +11,7 @@ import numpy as np
 
 from ahf_ros.deprecation import deprecated_arguments
 from ahf_ros.extras import missing
-from ahf_ros.imaging.headers import UPRIGHT, read_header
+from ahf_ros.imaging.headers import HEIC, UPRIGHT, read_header
 from ahf_ros.imaging.heic import ENDINGS, decoded_heic
 from ahf_ros.imaging.image import check_size, without_gaps
 from ahf_ros.imaging.whole import decoded
@@ -23,19 +22,6 @@ SUFFIXES = ('.bmp', '.jpeg', '.jpg', '.png', '.tif', '.tiff')
 """Endings of the image files that are tested; others are tried."""
 
 _LAST_ORIENTATION = 8
-_HEIC = 'HEIC'
-_OTHERS = tuple(
-    (kind, re.compile(begin, re.DOTALL))
-    for kind, begin in (
-        (_HEIC, rb'....ftyp(hei|hev|mif1|msf1)'),
-        ('AVIF', rb'....ftypavi'),
-        ('JPEG XL', rb'\xff\x0a|\0\0\0\x0cJXL '),
-        ('JPEG 2000', rb'\0\0\0\x0cjP  |\xff\x4f\xff\x51'),
-        ('a raw image', rb'....ftypcrx |FUJIFILMCCD-RAW|IIR[OS]|MMOR|IIU\0|FOVb'),
-    )
-)
-"""Formats of cameras that a decoder may not know, by the bytes that they begin with."""
-
 _ACCEPTED = f'accepted is one of {", ".join(SUFFIXES)}'
 _ADVICE = f'{_ACCEPTED}: convert it in full size to 16-bit TIFF or PNG, without lens corrections'
 
@@ -138,12 +124,11 @@ def _decoded(content: bytes, name: str) -> NotedImage:
     """Return an encoded image as its pixels are stored."""
     if not content:
         raise ValueError(f'{name} is empty, accepted is an image')
-    kind = next((kind for kind, begin in _OTHERS if begin.match(content)), '')
-    if kind == _HEIC and not missing('heic'):
+    header = read_header(content)
+    if header.kind == HEIC and not missing('heic'):
         pixels, count = decoded_heic(content, name)
         note = f'{name} has {count} images, the main one is read' if count > 1 else ''
         return NotedImage(pixels, note=note)
-    header = read_header(content)
     if header.raw:
         raise ValueError(f'{name} is a raw image, {_ADVICE}')
     check_size(header.width, header.height, name)
@@ -158,10 +143,10 @@ def _decoded(content: bytes, name: str) -> NotedImage:
     except cv2.error as error:  # for instance if the header says that the image is too large
         raise ValueError(f'{name} cannot be decoded: {error.err}') from error
     if image is None:
+        if header.kind:
+            more = f'; {missing("heic")}' if header.kind == HEIC else ''
+            raise ValueError(f'{name} is {header.kind}, {_ADVICE}{more}')
         what = f'is damaged: {damage}' if damage else 'is not an image, or is damaged'
-        if kind:
-            more = f'; {missing("heic")}' if kind == _HEIC else ''
-            raise ValueError(f'{name} is {kind}, {_ADVICE}{more}')
         raise ValueError(f'{name} {what}; {_ACCEPTED}')
     note = f'{name} has {header.pages} pages, the first is read' if header.pages > 1 else ''
     return NotedImage(without_gaps(image), header.orientation, note, damage)
