@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import os
 import struct
-from collections.abc import Callable, Generator, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterator
 from contextlib import suppress
 from io import BytesIO
 from pathlib import Path
@@ -15,7 +14,7 @@ import zstandard
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import EndOfFile
 from mcap.opcode import Opcode
-from mcap.records import Channel, Chunk, ChunkIndex, McapRecord
+from mcap.records import Channel, Chunk, McapRecord
 from mcap.stream_reader import StreamReader, breakup_chunk
 
 from ahf_ros.text import printable
@@ -25,6 +24,7 @@ _RECORD = struct.Struct('<BQ')  # opcode, bytes of content
 _CHUNK = struct.Struct('<QQQI')  # first and last time, ns; size; checksum of the records
 _MESSAGE = struct.Struct('<HIQ')  # channel, number, time, ns
 _CHECKSUM_AT = 24  # in a chunk
+_LONGEST = 2**62  # file, bytes; damage may make any size of a record
 
 
 class CutFile(ValueError):
@@ -37,16 +37,13 @@ def seconds(timestamp: int) -> str:
     return f'{"-" if timestamp < 0 else ""}{whole}.{part:09}'
 
 
-def read_records(
-    path: Path, most: int, leave_out: Callable[[str], None], unchecked: Callable[[], None]
-) -> Iterator[McapRecord]:
+def read_records(path: Path, most: int, leave_out: Callable[[str], None]) -> Iterator[McapRecord]:
     """Yield the records of a file, and those in its chunks, up to its end or to a damage.
 
-    A record may have `most` bytes. A chunk that is there again is left out and named, and one
-    without a checksum makes a call of `unchecked`. Of a cut chunk, the whole records are yielded;
-    then a `CutFile` is raised. A damage raises anything.
+    A record may have `most` bytes. A chunk that is there again is left out and named. Of a cut
+    chunk, the whole records are yielded; then a `CutFile` is raised. A damage raises anything.
     """
-    reading = _Reading(most, leave_out, unchecked)
+    reading = _Reading(most, leave_out)
     with path.open('rb') as file:
         where = yield from reading.records(file)
     if where:
@@ -56,10 +53,9 @@ def read_records(
 class _Reading:
     """What is known of a file that is being read."""
 
-    def __init__(
-        self, most: int, leave_out: Callable[[str], None], unchecked: Callable[[], None]
-    ) -> None:
-        self._most, self._leave_out, self._unchecked = most, leave_out, unchecked
+    def __init__(self, most: int, leave_out: Callable[[str], None]) -> None:
+        self._most = most
+        self._leave_out = leave_out
         self._topics: dict[int, str] = {}
         self._chunks: set[tuple[int, ...]] = set()
 
@@ -94,8 +90,6 @@ class _Reading:
                 self._leave_out(f'a chunk with messages {_span(*times)}, which is there again')
                 return
             self._chunks.add(known)
-            if not record.uncompressed_crc:
-                self._unchecked()
             parts = breakup_chunk(record, validate_crc=True)
         for part in parts:
             if isinstance(part, Channel):
@@ -132,10 +126,11 @@ def _stored(chunk: bytes, size: int) -> bytes:
     return b'' if compression else stored[:size]
 
 
-def has_checksums(file: IO[bytes], chunks: Iterable[ChunkIndex]) -> bool:
-    """Return whether all chunks of a file have a checksum."""
-    places = (it.chunk_start_offset + _RECORD.size + _CHECKSUM_AT for it in chunks)
-    return all(file.seek(it) and any(file.read(4)) for it in places)
+def has_checksums(path: Path) -> bool:
+    """Return whether the chunks of a file have checksums, by which damage in them is noticed."""
+    with path.open('rb') as file:
+        places = (place + _CHECKSUM_AT for place, _ in _chunks(file))
+        return all(file.seek(it) and file.read(4) != bytes(4) for it in places)
 
 
 def add_checksums(path: Path) -> None:
@@ -144,17 +139,22 @@ def add_checksums(path: Path) -> None:
     rosbags writes none.
     """
     with path.open('r+b') as file:
-        file.seek(_MAGIC_SIZE)
-        while head := file.read(_RECORD.size):
-            opcode, size = _RECORD.unpack(head)
-            if opcode != Opcode.CHUNK:
-                if opcode == Opcode.FOOTER:
-                    return
-                file.seek(size, os.SEEK_CUR)
-                continue
-            place = file.tell()
+        for place, size in _chunks(file):
             chunk = Chunk.read(ReadDataStream(BytesIO(file.read(size))))
             if not chunk.compression and not chunk.uncompressed_crc:
                 file.seek(place + _CHECKSUM_AT)
                 file.write(crc32(chunk.data).to_bytes(4, 'little'))
-            file.seek(place + size)
+
+
+def _chunks(file: IO[bytes]) -> Iterator[tuple[int, int]]:
+    """Yield where the content of each chunk begins, which is read next, and its size."""
+    place = _MAGIC_SIZE
+    while place < _LONGEST and file.seek(place):
+        head = file.read(_RECORD.size)
+        if len(head) < _RECORD.size or head[0] == Opcode.FOOTER:
+            return
+        place += _RECORD.size
+        opcode, size = _RECORD.unpack(head)
+        if opcode == Opcode.CHUNK:
+            yield place, size
+        place += size

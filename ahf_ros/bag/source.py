@@ -259,8 +259,10 @@ class Source(ExitStack):
             raise ValueError('it is not a regular file')
         if path.suffix == _COMPRESSED:
             path = self._decompressed(path, scratch)
-        if path.suffix == '.mcap' and not self._is_indexed(path):
-            return self._unindexed(path, scratch)
+        if path.suffix == '.mcap':
+            self.checked &= has_checksums(path)
+            if not self._is_indexed(path):
+                return self._unindexed(path, scratch)
         wal = path.with_name(f'{path.name}-wal')
         if wal.exists() and wal.stat().st_size:
             self._unopened.append(f'{wal.name} was not merged into {path.name}')
@@ -330,7 +332,6 @@ class Source(ExitStack):
             if summary is not None and summary.statistics is not None:
                 self._leave_out(summary.attachment_indexes, 'attachment')
                 self._leave_out(summary.metadata_indexes, 'metadata')
-                self.checked &= has_checksums(file, summary.chunk_indexes)
                 chunks = {_extent(it) for it in summary.chunk_indexes}
                 return bool(chunks) and len(chunks) == len(summary.chunk_indexes)
         return False
@@ -399,11 +400,8 @@ class Source(ExitStack):
         def leave_out(what: str) -> None:
             self.left_out[f'{path.name}: {what}'] = None
 
-        def unchecked() -> None:
-            self.checked = False
-
         try:
-            for record in read_records(path, MAXIMUM_SIZE, leave_out, unchecked):
+            for record in read_records(path, MAXIMUM_SIZE, leave_out):
                 yield record
                 time = record.log_time if isinstance(record, McapMessage) else time
         except Exception as error:

@@ -13,7 +13,7 @@ from ahf_ros.deprecation import deprecated_arguments
 from ahf_ros.extras import missing
 from ahf_ros.imaging.headers import HEIC, UPRIGHT, read_header
 from ahf_ros.imaging.heic import ENDINGS, decoded_heic
-from ahf_ros.imaging.image import check_size, without_gaps
+from ahf_ros.imaging.image import as_oriented, check_size, without_gaps
 from ahf_ros.imaging.whole import decoded
 from ahf_ros.opening import Most, read_bytes, reader
 from ahf_ros.writing import write_whole
@@ -98,20 +98,6 @@ def read_noted_image(path: str | Path, *, upright: bool = False) -> NotedImage:
     return replace(noted, image=image, note='; '.join(filter(None, (noted.note, note))))
 
 
-def as_oriented(image: np.ndarray, orientation: int) -> np.ndarray:
-    """Return an image turned upright, from its orientation in Exif (CIPA DC-008, table 4).
-
-    Orientations other than 1 to 8 are `UPRIGHT`.
-    """
-    if orientation in (5, 6, 7, 8):
-        image = image.T
-    if orientation in (3, 4, 7, 8):
-        image = image[::-1]
-    if orientation in (2, 3, 6, 7):
-        image = image[:, ::-1]
-    return np.ascontiguousarray(image)
-
-
 def decode_bytes(encoded: bytes, name: str) -> NotedImage:
     """Return an encoded image with the gray values that `read_image` returns.
 
@@ -126,8 +112,7 @@ def _decoded(content: bytes, name: str) -> NotedImage:
         raise ValueError(f'{name} is empty, accepted is an image')
     header = read_header(content)
     if header.kind == HEIC and not missing('heic'):
-        pixels, count = decoded_heic(content, name)
-        note = f'{name} has {count} images, the main one is read' if count > 1 else ''
+        pixels, note = decoded_heic(content, name)
         return NotedImage(pixels, note=note)
     if header.raw:
         raise ValueError(f'{name} is a raw image, {_ADVICE}')
