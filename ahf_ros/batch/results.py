@@ -261,8 +261,7 @@ def _fingerprint(task: ImageTask) -> str:
     values |= {'stack_movement': movement, 'stacked': task.stacked, 'upright': task.upright}
     if task.families:
         values['families'] = task.families
-    text = json.dumps(values, sort_keys=True)
-    return hashlib.sha256(text.encode()).hexdigest()[:16]
+    return hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()[:16]
 
 
 @contextmanager

@@ -34,6 +34,7 @@ from ahf_ros.cli.options import (
 )
 from ahf_ros.codes.families import AUTO
 from ahf_ros.doubt import doubtful_remark
+from ahf_ros.extras import missing
 from ahf_ros.inputs import check_output, register_input
 from ahf_ros.interchange.files import RESULTS_FILE
 from ahf_ros.opening import Most, file_errors, is_url, read_text, urls_named
@@ -370,7 +371,8 @@ def _named(argument: str, left_out: list[str]) -> Iterator[str]:
         files = sorted(str(it) for it in path.iterdir() if not it.is_dir())
         kinds = Counter(Path(it).suffix.lower() or 'without an ending' for it in files)
         if others := [f'{number} {it}' for it, number in kinds.items() if it not in suffixes]:
-            accepted = ', '.join(suffixes)
+            advice = missing('heic') if '.heic' in kinds else ''
+            accepted = '; '.join(filter(None, (', '.join(suffixes), advice)))
             left_out.append(f'{path}: left out are {listed(others)}; accepted are {accepted}')
         yield from (it for it in files if it.lower().endswith(suffixes))
     elif path.exists():

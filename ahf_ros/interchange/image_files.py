@@ -163,5 +163,4 @@ def write_image(path: str | Path, image: np.ndarray) -> None:
     path = Path(path)
     if path.suffix.lower() not in SUFFIXES:
         raise ValueError(f'{path} has an unknown format, accepted is one of {", ".join(SUFFIXES)}')
-    _, encoded = cv2.imencode(path.suffix, image)
-    write_whole(path, encoded.tobytes())
+    write_whole(path, cv2.imencode(path.suffix, image)[1].tobytes())

@@ -13,6 +13,7 @@ import pytest
 
 from ahf_ros.cli import main
 from ahf_ros.cli.identify import image_paths
+from ahf_ros.extras import missing
 from ahf_ros.imaging.headers import read_header
 from ahf_ros.interchange.exif import read_exif
 from ahf_ros.interchange.image_files import (
@@ -308,3 +309,4 @@ def test_what_is_left_out_of_a_folder_is_counted_by_kind(tmp_path, monkeypatch):
     assert [it.partition(';')[0] for it in left_out] == [
         f'{tmp_path}: left out are 2 .heic, 1 .cr2, 1 without an ending'
     ]
+    assert left_out[0].endswith(missing('heic'))
