@@ -228,15 +228,11 @@ def read_pyramid(
                 likely, others = measure_likely(part, dots, None if every else codes)
             unread = Hypotheses.unread(others, families[0])
             seen = seen.after(at_full_size(images[: octave.level + 1], unread))
-            seen = _read(octave, images, likely, codes, seen, expected, every=every)
+            seen = _read(part, octave, images, likely, codes, seen, expected, every=every)
             fits.append(dots)
         measured.append((octave, Fit.joined(fits)))
     for octave, _ in measured if shown else ():
-        alike = seen.targets.alike(octave)
-        if len(alike.frames):
-            likely = measure_alike(octave.pyramid.gray, alike)
-            later = _read(octave, images, likely, shown, seen, expected, every=False)
-            seen = seen.with_targets(later)  # all else was read in the shape of the dots
+        seen = _with_alike(octave, images, shown, seen, expected)
     for octave, dots in measured:
         part = octave.pyramid.gray
         while True:
@@ -250,7 +246,7 @@ def read_pyramid(
             clear = seen.explained.select(seen.explained.clear)
             dots = dots.select(~clear.on_them(dots.frames, octave.level))
             likely, _ = measure_likely(part, dots, codes)
-            seen = _read(octave, images, likely, codes, seen, expected, every=every)
+            seen = _read(part, octave, images, likely, codes, seen, expected, every=every)
             shown = shown + codes
     read = Hypotheses.joined(seen.found)
     if len(shown) > 1:
@@ -260,7 +256,29 @@ def read_pyramid(
     return replace(read, families=np.array(as_described, object))
 
 
+def _with_alike(
+    octave: Octave,
+    images: Sequence[np.ndarray],
+    codes: Sequence[Family],
+    seen: _Seen,
+    expected: frozenset[int],
+) -> _Seen:
+    """Return what is seen once dots in the shapes of certain targets about them are read as well.
+
+    All else was read in the shape of the dots.
+    """
+    alike = seen.targets.alike(octave)
+    if not len(alike.frames):
+        return seen
+    gray = octave.pyramid.gray
+    likely = measure_alike(gray, alike)
+    return seen.with_targets(
+        _read(gray, octave, images, likely, codes, seen, expected, every=False)
+    )
+
+
 def _read(
+    gray: np.ndarray,
     octave: Octave,
     images: Sequence[np.ndarray],
     dots: Fit,
@@ -270,7 +288,7 @@ def _read(
     *,
     every: bool,
 ) -> _Seen:
-    """Return what is seen once dots of an octave are read, the most hopeful ones first.
+    """Return what is seen once dots are read in the image of an octave, the most hopeful first.
 
     Thousands of spots of light or letters look a little like dots with a band. They are mostly of
     one colour, and must not crowd out the other. Where a part of the dots of a colour shows no
@@ -280,7 +298,7 @@ def _read(
     while any(len(of.frames) for of in left):
         part = Fit.joined([of.select(slice(_PART)) for of in left])
         prior = seen.prior(expected, octave.level)
-        read = read_families(octave.pyramid.gray, part, codes, prior)
+        read = read_families(gray, part, codes, prior)
         seen = seen.after(at_full_size(images[: octave.level + 1], read))
         shown = set(read.polarity[read.certain])
         for index, polarity in enumerate((1, -1)):
