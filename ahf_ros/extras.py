@@ -21,6 +21,7 @@ EXTRAS = {
     'cluster': Extra('--scheduler', ('distributed',)),
     'completion': Extra('completion in the shell', ('argcomplete',)),
     'dataframe': Extra('to_dataframe', ('pandas',)),
+    'heic': Extra('images of HEIC', ('pillow_heif',)),
     'orient': Extra('ahf orient and compare', ('jinja2', 'PIL', 'scipy')),
     'print': Extra('PDF of ahf targets', ('reportlab',)),
     'report': Extra('ahf report', ('jinja2',)),

@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,7 @@ from ahf_ros.codes.data_file import read_data_file
 from ahf_ros.codes.dots import DOTS_DESIGN, dot_family
 from ahf_ros.codes.gsi import GSI_LIBRARY, point_family
 from ahf_ros.codes.ring import RING_FOLDER, ring_family
+from ahf_ros.extras import missing
 from ahf_ros.interchange.arrays import read_arrays
 from ahf_ros.interchange.camera_files import read_camera
 from ahf_ros.interchange.cloud_files import read_cloud, write_pcd, write_ply
@@ -159,6 +161,13 @@ def _images() -> Iterator[Sample]:
         _, encoded = cv2.imencode(suffix, image)
         for read in (read_noted_image, read_exif):
             yield Sample(read, f'a{suffix}', encoded.tobytes(), False)
+    if not missing('heic'):
+        from pillow_heif import from_bytes
+
+        file = BytesIO()
+        from_bytes(mode='L', size=(32, 24), data=image.tobytes()).save(file, quality=90)
+        for read in (read_noted_image, read_exif):
+            yield Sample(read, 'a.heic', file.getvalue(), False)
 
 
 def _clouds() -> Iterator[Sample]:

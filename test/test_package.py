@@ -59,6 +59,7 @@ NOT_IN_ROSDEP = {
     'fsspec',
     'mcap',
     'pandas',
+    'pillow_heif',
     'pycolmap',
     'pypdfium2',
     'rosbags',

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import struct
 from collections.abc import Callable, Generator, Iterator
 from contextlib import suppress
@@ -25,6 +24,7 @@ _RECORD = struct.Struct('<BQ')  # opcode, bytes of content
 _CHUNK = struct.Struct('<QQQI')  # first and last time, ns; size; checksum of the records
 _MESSAGE = struct.Struct('<HIQ')  # channel, number, time, ns
 _CHECKSUM_AT = 24  # in a chunk
+_LONGEST = 2**62  # file, bytes; damage may make any size of a record
 
 
 class CutFile(ValueError):
@@ -126,23 +126,35 @@ def _stored(chunk: bytes, size: int) -> bytes:
     return b'' if compression else stored[:size]
 
 
+def has_checksums(path: Path) -> bool:
+    """Return whether the chunks of a file have checksums, by which damage in them is noticed."""
+    with path.open('rb') as file:
+        places = (place + _CHECKSUM_AT for place, _ in _chunks(file))
+        return all(file.seek(it) and file.read(4) != bytes(4) for it in places)
+
+
 def add_checksums(path: Path) -> None:
     """Write the checksum of each chunk that has none into a file whose chunks are not compressed.
 
     rosbags writes none.
     """
     with path.open('r+b') as file:
-        file.seek(_MAGIC_SIZE)
-        while head := file.read(_RECORD.size):
-            opcode, size = _RECORD.unpack(head)
-            if opcode != Opcode.CHUNK:
-                if opcode == Opcode.FOOTER:
-                    return
-                file.seek(size, os.SEEK_CUR)
-                continue
-            place = file.tell()
+        for place, size in _chunks(file):
             chunk = Chunk.read(ReadDataStream(BytesIO(file.read(size))))
             if not chunk.compression and not chunk.uncompressed_crc:
                 file.seek(place + _CHECKSUM_AT)
                 file.write(crc32(chunk.data).to_bytes(4, 'little'))
-            file.seek(place + size)
+
+
+def _chunks(file: IO[bytes]) -> Iterator[tuple[int, int]]:
+    """Yield where the content of each chunk begins, which is read next, and its size."""
+    place = _MAGIC_SIZE
+    while place < _LONGEST and file.seek(place):
+        head = file.read(_RECORD.size)
+        if len(head) < _RECORD.size or head[0] == Opcode.FOOTER:
+            return
+        place += _RECORD.size
+        opcode, size = _RECORD.unpack(head)
+        if opcode == Opcode.CHUNK:
+            yield place, size
+        place += size

@@ -202,6 +202,8 @@ def _answer_images(
     """Identify the images that are not in the journal yet."""
     answering = _Answering(task, source, topics)
     total = sum(item.msgcount for item in source.connections if item.topic in topics)
+    if not source.checked:
+        report(0, total, 'chunks have no checksums, so that damage in them may not be noticed')
     earlier = list(journal.entries)
     settled: dict[str, tuple[str, ...]] = {}  # families by topic
     for number, (message, last) in enumerate(_with_last(source.messages(topics))):

@@ -29,7 +29,7 @@ from rosbags import rosbag1, rosbag2
 from rosbags.interfaces import Connection, ConnectionExtRosbag1, ConnectionExtRosbag2
 
 from ahf_ros.bag.definitions import COMPRESSED_IMAGE, IMAGE, TypeStores, as_ros2
-from ahf_ros.bag.mcap_records import CutFile, read_records, seconds
+from ahf_ros.bag.mcap_records import CutFile, has_checksums, read_records, seconds
 from ahf_ros.opening import parsing, read_text
 from ahf_ros.parsed_yaml import parsed_yaml
 from ahf_ros.text import counted, printable, reason_of
@@ -115,6 +115,8 @@ class Source(ExitStack):
         Types of the messages.
     left_out : dict of str to None
         What a copy does not have besides messages that are missing, as an ordered set.
+    checked : bool
+        Whether all chunks of MCAP files have a checksum, by which damage in them is noticed.
     """
 
     def __init__(self, path: Path) -> None:
@@ -124,6 +126,7 @@ class Source(ExitStack):
         self.connections: list[Connection] = []
         self.foreign: list[Connection] = []
         self.left_out: dict[str, None] = {}
+        self.checked = True
         self.stores = TypeStores()
         self._files: list[_File] = []
         self._unopened: list[str] = []
@@ -256,8 +259,10 @@ class Source(ExitStack):
             raise ValueError('it is not a regular file')
         if path.suffix == _COMPRESSED:
             path = self._decompressed(path, scratch)
-        if path.suffix == '.mcap' and not self._is_indexed(path):
-            return self._unindexed(path, scratch)
+        if path.suffix == '.mcap':
+            self.checked &= has_checksums(path)
+            if not self._is_indexed(path):
+                return self._unindexed(path, scratch)
         wal = path.with_name(f'{path.name}-wal')
         if wal.exists() and wal.stat().st_size:
             self._unopened.append(f'{wal.name} was not merged into {path.name}')

@@ -257,15 +257,11 @@ def _fingerprint(task: ImageTask) -> str:
     if files := task.settings.detection.family_file:
         values['family_file'] = files_digest(files)
     del values['threads']  # which does not change results
-    values |= {
-        'stack_movement': task.stacking.stack_movement,
-        'stacked': task.stacked,
-        'upright': task.upright,
-    }
+    movement = task.stacking.stack_movement
+    values |= {'stack_movement': movement, 'stacked': task.stacked, 'upright': task.upright}
     if task.families:
         values['families'] = task.families
-    text = json.dumps(values, sort_keys=True)
-    return hashlib.sha256(text.encode()).hexdigest()[:16]
+    return hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()[:16]
 
 
 @contextmanager

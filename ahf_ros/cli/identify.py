@@ -34,6 +34,7 @@ from ahf_ros.cli.options import (
 )
 from ahf_ros.codes.families import AUTO
 from ahf_ros.doubt import doubtful_remark
+from ahf_ros.extras import missing
 from ahf_ros.inputs import check_output, register_input
 from ahf_ros.interchange.files import RESULTS_FILE
 from ahf_ros.opening import Most, file_errors, is_url, read_text, urls_named
@@ -361,18 +362,19 @@ def image_paths(arguments: Sequence[str]) -> tuple[list[str], list[str], list[st
 
 
 def _named(argument: str, left_out: list[str]) -> Iterator[str]:
-    from ahf_ros.interchange.image_files import SUFFIXES
+    from ahf_ros.interchange.image_files import image_suffixes
 
-    path = Path(argument)
+    path, suffixes = Path(argument), image_suffixes()
     if is_url(argument):
-        yield from urls_named(argument, SUFFIXES)
+        yield from urls_named(argument, suffixes)
     elif path.is_dir():
         files = sorted(str(it) for it in path.iterdir() if not it.is_dir())
         kinds = Counter(Path(it).suffix.lower() or 'without an ending' for it in files)
-        if others := [f'{number} {it}' for it, number in kinds.items() if it not in SUFFIXES]:
-            accepted = ', '.join(SUFFIXES)
+        if others := [f'{number} {it}' for it, number in kinds.items() if it not in suffixes]:
+            advice = missing('heic') if '.heic' in kinds else ''
+            accepted = '; '.join(filter(None, (', '.join(suffixes), advice)))
             left_out.append(f'{path}: left out are {listed(others)}; accepted are {accepted}')
-        yield from (it for it in files if it.lower().endswith(SUFFIXES))
+        yield from (it for it in files if it.lower().endswith(suffixes))
     elif path.exists():
         yield argument
     elif argument.startswith('@'):

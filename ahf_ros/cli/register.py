@@ -102,17 +102,17 @@ def run(options: argparse.Namespace) -> int:
 
 def _pairs(folder: Path) -> Iterator[tuple[Path, Path]]:
     """Yield the clouds of a folder, sorted by name, with the image of each."""
-    from ahf_ros.interchange.image_files import SUFFIXES
+    from ahf_ros.interchange.image_files import image_suffixes
 
     if not folder.is_dir():
         raise ValueError(f'{folder} is no folder, accepted is one with PLY or PCD files')
-    files = sorted(folder.iterdir())
+    files, suffixes = sorted(folder.iterdir()), image_suffixes()
     clouds = [it for it in files if it.suffix.lower() in _CLOUDS]
     if not clouds:
         raise ValueError(f'{folder} has no PLY or PCD file, accepted is a folder of them')
     stems = [it.stem for it in clouds]
     for cloud in clouds:
-        images = [it for it in files if it.stem == cloud.stem and it.suffix.lower() in SUFFIXES]
+        images = [it for it in files if it.stem == cloud.stem and it.suffix.lower() in suffixes]
         if len(images) != 1 or stems.count(cloud.stem) > 1:
             raise ValueError(
                 f'{cloud} has {stems.count(cloud.stem)} clouds and {len(images)} images of its '

@@ -26,7 +26,7 @@ from ahf_ros.cli.options import (
     settings_from,
 )
 from ahf_ros.interchange.files import RESULTS_FILE
-from ahf_ros.interchange.image_files import SUFFIXES
+from ahf_ros.interchange.image_files import image_suffixes
 from ahf_ros.session_settings import IdentificationSettings
 from ahf_ros.settings.parameter import Parameter
 
@@ -71,7 +71,7 @@ def run(options: argparse.Namespace) -> int:
         return image_task(options, [path], shared)
 
     say = partial(tell, 'watch')
-    arrivals = Arrivals(options.folder, SUFFIXES, options.recursive, options.settling)
+    arrivals = Arrivals(options.folder, image_suffixes(), options.recursive, options.settling)
     with redirect_stdout(sys.stderr):  # what other detectors print is not JSON
         check_settings(settings)
         engine = create_engine(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol, runtime_checkable
 
 from ahf_ros.codes.families import (
     ACCEPTED,
@@ -155,6 +155,11 @@ class Contesting(Protocol):
 @runtime_checkable
 class Searching(Protocol):
     """A detector that begins with the pyramid of an image, which detectors of one image share."""
+
+    @property
+    def contrast(self) -> int:
+        """Times the contrast of edges in this pyramid."""
+        ...
 
     def search(self, pyramid: ImagePyramid) -> list[Target]:
         """Identify the targets of one image, as a call does."""
@@ -309,6 +314,7 @@ class FamilyDetector(ABC):
     """
 
     settings: DetectorSettings
+    contrast: ClassVar[int] = 1  # see `Searching`
 
     def __post_init__(self) -> None:
         """Refuse what is not accepted before the first image comes."""

@@ -122,8 +122,10 @@ class SeveralDetector:
             if nothing or left.min() == left.max():  # all that there was is painted over
                 results.append([])
                 continue
-            if together and pyramid is None:
-                pyramid = self._pyramid(left)
+            if shared and isinstance(part, Searching):
+                if pyramid and pyramid.contrast != part.contrast:
+                    pyramid = None  # before there is another one: it takes much memory
+                pyramid = pyramid or self._pyramid(left, part.contrast)
             if pyramid and isinstance(part, Explaining):
                 found, dots = part.explain(pyramid)
                 dots = None if self.settings.report_undecoded else dots
@@ -138,12 +140,13 @@ class SeveralDetector:
                 dots = dots if dots is None else _beside(dots, known)
         return results
 
-    def _pyramid(self, image: np.ndarray) -> ImagePyramid:
-        """Return the pyramid of an image that detectors share."""
-        return replace(
-            image_pyramid(as_gray(image), self.settings.max_radius),
-            common=CommonSearch(self.settings.radii[0], self.settings.polarities),
-        )
+    def _pyramid(self, image: np.ndarray, contrast: int) -> ImagePyramid:
+        """Return the pyramid of an image, which all detectors share at its own contrast."""
+        pyramid = image_pyramid(as_gray(image), self.settings.max_radius, contrast)
+        if contrast > 1:
+            return pyramid
+        common = CommonSearch(self.settings.radii[0], self.settings.polarities)
+        return replace(pyramid, common=common)
 
     def _merged(self, results: Sequence[Sequence[Target]]) -> list[Target]:
         """Return the targets of all detectors that own their places."""

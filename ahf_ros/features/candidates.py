@@ -65,6 +65,7 @@ _OWN = 1 / 8  # of the weighted votes of a peak, that its own cell has
 _WEIGHTS = (0.5, 1.0, 0.5)  # of votes for the cell before, for a cell itself, and the next one
 _PART = 8192  # edges that vote, or cells that are looked at, at a time, which stay in the cache
 _MOST_CELLS = 2**24  # that are counted in at a time, which bounds the memory
+_FIELD = 2**22  # that are compared at a time
 _FLAT = 1e-6  # curvature of votes from which their top is computed
 
 
@@ -298,16 +299,36 @@ def highest(
 
     The cells are indices into rows and columns of a shape, row by row.
     """
-    field = np.zeros(shape[0] * shape[1], np.float32)
+    tall, wide = shape
+    rows = max(_FIELD // wide, 2 * reach + 1)
+    if 2 * rows < tall:
+        return _highest_in_bands(cells, values, shape, reach, rows)
+    field = np.zeros(tall * wide, np.float32)
     values = values.astype(np.float32)
     np.maximum.at(field, cells, values)
     which = np.arange(len(cells))
     for down in range(-reach, reach + 1):
         for across in range(-reach, reach + 1):
-            beside = field.take(cells[which] + (down * shape[1] + across), mode='clip')
+            beside = field.take(cells[which] + (down * wide + across), mode='clip')
             which = which[values[which] >= beside]
     free = np.zeros(len(cells), bool)
     free[which] = True
+    return free
+
+
+def _highest_in_bands(
+    cells: np.ndarray, values: np.ndarray, shape: tuple[int, int], reach: int, rows: int
+) -> np.ndarray:
+    """Return what `highest` does, so many rows at a time, which bounds the memory."""
+    tall, wide = shape
+    free = np.zeros(len(cells), bool)
+    for top in range(0, tall, rows):
+        first, beyond = max(top - reach, 0), min(top + rows + reach, tall)
+        near = np.flatnonzero((cells >= first * wide) & (cells < beyond * wide))
+        own = cells[near] - first * wide
+        band = highest(own, values[near], (beyond - first, wide), reach)
+        within = (own >= (top - first) * wide) & (own < (top - first + rows) * wide)
+        free[near[within]] = band[within]
     return free
 
 

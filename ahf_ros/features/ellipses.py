@@ -12,6 +12,7 @@ from ahf_ros.features import frame
 from ahf_ros.features.candidates import Candidates
 from ahf_ros.features.dots import NO_DOTS, Dots
 from ahf_ros.features.log_edges import LOG_SCALE
+from ahf_ros.features.pyramid import MINIMUM_ASPECT
 from ahf_ros.features.robust import fit_linear, medians
 from ahf_ros.features.sampling import sample_circles
 
@@ -40,7 +41,6 @@ _FLAT = -1e-3  # curvature of a peak of the steps, from which its top is compute
 _ROUNDS = 3  # of robust least squares
 _OUTLIERS = 5.0  # to a window: residuals that quarter the weight of a ray
 _INLIER, _PIXEL_INLIER = 0.06, 0.4  # of the radius, or px
-_MINIMUM_ASPECT = 0.2
 _MINIMUM_MINOR = 1.0  # px
 _PART = 512  # dots fitted at a time, which stay in the cache
 
@@ -73,7 +73,7 @@ def refine_ellipses(log: np.ndarray, dots: Dots) -> Dots:
     for window, minimum_share, every in _WINDOWS:
         dots = _refined(log, dots, window, _ANGLES[::every])
         major, minor, _ = frame.ellipse_axes(dots.frames)
-        good = (minor > _MINIMUM_ASPECT * major) & (minor > _MINIMUM_MINOR)
+        good = (minor > MINIMUM_ASPECT * major) & (minor > _MINIMUM_MINOR)
         good &= dots.share > minimum_share
         dots = dots.select(good)
     return resized(log, dots)

@@ -34,7 +34,7 @@ def targets_of_octaves(
     for octave in octaves(pyramid, *radii):
         targets = identify(octave)
         # Halves without targets may have no contrast.
-        for half in reversed((pyramid.gray, *pyramid.halves)[: octave.level if targets else 0]):
+        for half in reversed(pyramid.images[: octave.level if targets else 0]):
             targets = refine(half, [_enlarged(target) for target in targets])
         found += targets
     return found

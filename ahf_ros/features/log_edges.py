@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import cv2
 import numpy as np
@@ -14,6 +15,7 @@ LOG_SCALE = 1000.0
 _WEAK_EDGE, _STRONG_EDGE = 0.15, 0.22  # steps of ln, of the thresholds with hysteresis
 _STRAIGHT = 0.97  # cosine between the directions of an edge and of its continuation
 _PART = 32_768  # edges looked at at a time, which stay in the cache
+_BAND = 2**23  # pixels whose edges are listed at a time, which bounds the memory
 _CONTINUED = 0.5  # of the strength of an edge, that its continuation has at least
 
 
@@ -21,8 +23,8 @@ _CONTINUED = 0.5  # of the strength of an edge, that its continuation has at lea
 class LogEdges:
     """The edge pixels of a logarithmic image, and their gradients."""
 
-    dx: np.ndarray  # int16, (height, width), gradient of the image, as the next
-    dy: np.ndarray
+    log: np.ndarray  # int16, (height, width)
+    contrast: float  # times the steps of the image
     marked: np.ndarray  # uint8, (height, width), not zero on edges
     x: np.ndarray  # int32, (m,), the edge pixels, as the next
     y: np.ndarray
@@ -30,10 +32,19 @@ class LogEdges:
     unit_y: np.ndarray
     strength: np.ndarray  # float32, (m,), size of these gradients
 
+    @staticmethod
+    def joined(parts: Sequence[LogEdges]) -> LogEdges:
+        """Return the edge pixels of all parts of one image."""
+        if len(parts) == 1:
+            return parts[0]
+        lists: dict[str, Any] = {
+            name: np.concatenate([getattr(it, name) for it in parts]) for name in _LISTED
+        }
+        return replace(parts[0], **lists)
+
     def select(self, which: np.ndarray | slice) -> LogEdges:
         """Return some of the edge pixels, by an index array, a mask of shape (m,) or a slice."""
-        names = ('x', 'y', 'unit_x', 'unit_y', 'strength')
-        return replace(self, **{name: getattr(self, name)[which] for name in names})
+        return replace(self, **{name: getattr(self, name)[which] for name in _LISTED})
 
     def unmasked(self, mask: np.ndarray) -> LogEdges:
         """Return the edges where a mask of the size of the image is 0."""
@@ -41,25 +52,40 @@ class LogEdges:
 
     def curved(self, length: float) -> LogEdges:
         """Return the edges that do not run straight on for `length` px, to neither side."""
+        reach = int(length) + 2
         straight = [np.zeros(0, bool)]
         for start in range(0, len(self.x), _PART):
             part = slice(start, start + _PART)
-            straight.append(self._continues(part, length) & self._continues(part, -length))
+            rows = self.y[part]
+            first = max(rows.min() - reach, 0)
+            gradient = _gradient(self.log, self.contrast, first, rows.max() + reach + 1)
+            ahead, behind = (
+                self._continues(part, way, gradient, first) for way in (length, -length)
+            )
+            straight.append(ahead & behind)
         return self.select(np.flatnonzero(~np.concatenate(straight)))
 
-    def _continues(self, part: slice, way: float) -> np.ndarray:
-        """Return whether some edges have the same gradient `way` px along themselves."""
-        height, width = self.dx.shape
+    def _continues(
+        self, part: slice, way: float, gradient: Sequence[np.ndarray], first: int
+    ) -> np.ndarray:
+        """Return whether some edges have the same gradient `way` px along themselves.
+
+        The gradient is the one of rows from the first one on that is looked at.
+        """
+        height, width = self.log.shape
         unit_x, unit_y = self.unit_x[part], self.unit_y[part]
         x = np.rint(self.x[part] - np.float32(way) * unit_y)
         y = np.rint(self.y[part] + np.float32(way) * unit_x)
-        at = np.clip(y, 0, height - 1).astype(np.intp) * width
+        at = (np.clip(y, 0, height - 1).astype(np.intp) - first) * width
         at += np.clip(x, 0, width - 1).astype(np.intp)
-        across, down = (of.ravel().take(at).astype(np.float32) for of in (self.dx, self.dy))
+        across, down = (of.ravel().take(at).astype(np.float32) for of in gradient)
         along = across * unit_x + down * unit_y
         strong = along > np.float32(_CONTINUED) * self.strength[part]
         squares = across * across + down * down
         return strong & (along * along > np.float32(_STRAIGHT**2) * squares)
+
+
+_LISTED = 'x', 'y', 'unit_x', 'unit_y', 'strength'
 
 
 def mask_of(polygons: Iterable[np.ndarray], shape: tuple[int, ...]) -> np.ndarray:
@@ -72,13 +98,38 @@ def mask_of(polygons: Iterable[np.ndarray], shape: tuple[int, ...]) -> np.ndarra
 
 def find_edges(log: np.ndarray) -> LogEdges:
     """Return the edges of a logarithmic image, ndarray of int16, shape (height, width)."""
-    dx = cv2.Scharr(log, cv2.CV_16S, 1, 0, scale=1 / 32)
-    dy = cv2.Scharr(log, cv2.CV_16S, 0, 1, scale=1 / 32)
+    return LogEdges.joined([*edges_in_bands(log)])
+
+
+def edges_in_bands(log: np.ndarray, contrast: float = 1.0) -> Iterator[LogEdges]:
+    """Yield the edges of a logarithmic image with so many times its contrast, row by row.
+
+    Those of large images come in bands of rows: lists of them take more memory than the image.
+    """
+    height, width = log.shape
     weak, strong = _WEAK_EDGE * LOG_SCALE, _STRONG_EDGE * LOG_SCALE
-    marked = cv2.Canny(dx, dy, weak, strong, L2gradient=True)
-    pixels = cv2.findNonZero(marked)
-    pixels = np.zeros((0, 2), np.int32) if pixels is None else pixels.reshape(-1, 2)
-    x, y = pixels[:, 0].copy(), pixels[:, 1].copy()
-    across, down = dx[y, x].astype(np.float32), dy[y, x].astype(np.float32)
-    strength = np.hypot(across, down)
-    return LogEdges(dx, dy, marked, x, y, across / strength, down / strength, strength)
+    gradient = _gradient(log, contrast, 0, height)
+    marked = cv2.Canny(*gradient, weak, strong, L2gradient=True)
+    rows = max(_BAND // width, 1)
+    for top in range(0, height, rows):
+        if rows < height:
+            gradient = _gradient(log, contrast, top, top + rows)
+        pixels = cv2.findNonZero(marked[top : top + rows])
+        pixels = np.zeros((0, 2), np.int32) if pixels is None else pixels.reshape(-1, 2)
+        x, y = pixels[:, 0].copy(), pixels[:, 1].copy()
+        across, down = (of[y, x].astype(np.float32) for of in gradient)
+        strength = np.hypot(across, down)
+        y += top
+        yield LogEdges(log, contrast, marked, x, y, across / strength, down / strength, strength)
+
+
+def _gradient(
+    log: np.ndarray, contrast: float, first: int, beyond: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the gradient of some rows of an image, x and y, int16, in its units for a px."""
+    above = max(first - 1, 0)
+    around = log[above : beyond + 1]
+    own = slice(first - above, beyond - above)
+    scale = contrast / 32
+    dx = cv2.Scharr(around, cv2.CV_16S, 1, 0, scale=scale)[own]
+    return dx, cv2.Scharr(around, cv2.CV_16S, 0, 1, scale=scale)[own]

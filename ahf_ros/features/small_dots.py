@@ -81,12 +81,12 @@ def small_dots(
     reduced = cv2.resize(eight_bit, size, interpolation=cv2.INTER_AREA)
     side = 2 * int(np.ceil(max_radius / _REDUCTION)) + 3
     kernel = np.ones((side, side), np.uint8)
-    found: list[Dots] = []
+    steps, found = np.empty_like(eight_bit), list[Dots]()
     for polarity in polarities:
         operation = cv2.MORPH_CLOSE if polarity > 0 else cv2.MORPH_OPEN
         ground = cv2.morphologyEx(reduced, operation, kernel)
-        ground = cv2.resize(ground, (width, height), interpolation=cv2.INTER_LINEAR)
-        steps = cv2.subtract(*((ground, eight_bit) if polarity > 0 else (eight_bit, ground)))
+        cv2.resize(ground, (width, height), steps, interpolation=cv2.INTER_LINEAR)
+        cv2.subtract(*((steps, eight_bit) if polarity > 0 else (eight_bit, steps)), steps)
         for outline in explained:
             cv2.fillConvexPoly(steps, np.rint(outline).astype(np.int32), 0)
         found += _blobs_of_strips(steps, min_radius, max_radius, polarity)

@@ -8,16 +8,17 @@ float64 nor colour ones of float32, and does not say where in a file the orienta
 from __future__ import annotations
 
 import math
+import re
 import struct
 from contextlib import suppress
 from dataclasses import dataclass
 
+from ahf_ros.imaging.png import is_png, png_chunks
 from ahf_ros.imaging.tiff import Field, directories, first_at, first_directory, is_tiff
 
 UPRIGHT = 1
 """Orientation of an image whose first row is the upper one and whose first column is the left."""
 
-_PNG = b'\x89PNG\r\n\x1a\n'
 _SUBFILE, _WIDTH, _HEIGHT, _COLOURS, _ORIENTATION = 254, 256, 257, 262, 274  # tags of TIFF
 _REDUCED = 1 | 4  # bits of the first: a reduced image, a mask
 _RAW = 32803, 34892  # colours: as the filter of the sensor, and linear raw
@@ -25,14 +26,30 @@ _FRAMES = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}  # JPEG markers with
 _DAMAGES = struct.error, ValueError, OverflowError  # of headers
 
 
+HEIC = 'HEIC'
+"""A kind of images that an extra reads."""
+
+_OTHERS = tuple(
+    (kind, re.compile(begin, re.DOTALL))
+    for kind, begin in (
+        (HEIC, rb'....ftyp(hei|hev|mif1|msf1)'),
+        ('AVIF', rb'....ftypavi'),
+        ('JPEG XL', rb'\xff\x0a|\0\0\0\x0cJXL '),
+        ('JPEG 2000', rb'\0\0\0\x0cjP  |\xff\x4f\xff\x51'),
+        ('a raw image', rb'....ftypcrx |FUJIFILMCCD-RAW|IIR[OS]|MMOR|IIU\0|FOVb'),
+    )
+)
+"""Formats of cameras that OpenCV may not know, by the bytes that they begin with."""
+
+
 @dataclass(frozen=True, slots=True)
 class ImageHeader:
     """What an image file says of itself.
 
     A width or height of 0 px is not known. `orientation` is as in Exif, 1 to 8. A TIFF file has
-    `pages`, and may be `raw`, what a sensor saw before colours were made of it. With `changes`,
-    each a place, a layout for `struct` and a value, decoders take the image of full size as it is
-    stored.
+    `pages`, and may be `raw`, what a sensor saw before colours were made of it. The `kind` is one
+    of the formats that OpenCV may not know, empty for others. With `changes`, each a place, a
+    layout for `struct` and a value, decoders take the image of full size as it is stored.
     """
 
     width: int = 0
@@ -40,13 +57,14 @@ class ImageHeader:
     orientation: int = UPRIGHT
     pages: int = 1
     raw: bool = False
+    kind: str = ''
     changes: tuple[tuple[int, str, int], ...] = ()
 
 
 def read_header(content: bytes) -> ImageHeader:
     """Return the header of an image file; of a format or file that is not known, an empty one."""
     with suppress(*_DAMAGES):
-        if content.startswith(_PNG):
+        if is_png(content):
             return _png(content)
         if content.startswith(b'\xff\xd8'):
             return _jpeg(content)
@@ -57,20 +75,19 @@ def read_header(content: bytes) -> ImageHeader:
         if content.startswith(b'BM'):
             width, height = struct.unpack_from('<ii', content, 18)
             return ImageHeader(abs(width), abs(height))
-    return ImageHeader()
+    kind = next((kind for kind, begin in _OTHERS if begin.match(content)), '')
+    return ImageHeader(kind=kind)
 
 
 def _png(content: bytes) -> ImageHeader:
     width, height = struct.unpack_from('>LL', content, 16)
     orientation = UPRIGHT
-    place = len(_PNG)
-    while place + 8 <= len(content):
-        size, kind = struct.unpack_from('>L4s', content, place)
-        if kind == b'eXIf':
-            orientation = _exif(content[place + 8 : place + 8 + size])
-        if kind in (b'eXIf', b'IDAT', b'IEND'):
-            break
-        place += 12 + size
+    with suppress(struct.error):
+        for kind, place, size in png_chunks(content):
+            if kind == b'eXIf':
+                orientation = _exif(content[place : place + size])
+            if kind in (b'eXIf', b'IDAT'):
+                break
     return ImageHeader(width, height, orientation)
 
 

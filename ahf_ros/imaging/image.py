@@ -67,6 +67,20 @@ def check_size(width: int, height: int, name: str) -> None:
         )
 
 
+def as_oriented(image: np.ndarray, orientation: int) -> np.ndarray:
+    """Return an image turned upright, from its orientation in Exif (CIPA DC-008, table 4).
+
+    Orientations other than 1 to 8 are `UPRIGHT`.
+    """
+    if orientation in (5, 6, 7, 8):
+        image = image.T
+    if orientation in (3, 4, 7, 8):
+        image = image[::-1]
+    if orientation in (2, 3, 6, 7):
+        image = image[:, ::-1]
+    return np.ascontiguousarray(image)
+
+
 def without_gaps(image: np.ndarray) -> np.ndarray:
     """Return an image in which pixels that are not finite are 0, unless all of them are not.
 

@@ -10,7 +10,7 @@ import numpy as np
 LARGEST = 32_766
 """Longest side of an image, and of a map, that OpenCV takes, px."""
 
-_ROWS = 16_384  # of points in an image that is too large, in a part
+_POINTS = 16_384  # in an image that is too large, at a time
 
 
 def remapped(
@@ -37,17 +37,18 @@ def remapped(
     if y is None:
         x, y = x[..., 0], x[..., 1]
     shape, (height, width) = x.shape, image.shape
-    x, y = np.clip(x.reshape(-1, 1), 0, width - 1), np.clip(y.reshape(-1, 1), 0, height - 1)
+    x, y = np.clip(x.reshape(1, -1), 0, width - 1), np.clip(y.reshape(1, -1), 0, height - 1)
     values = np.empty(x.shape, image.dtype)
     for top, bottom in _spans(height):
+        rows = np.flatnonzero((y[0] >= top) & (y[0] < bottom))
         for left, right in _spans(width):
-            inside = (x[:, 0] >= left) & (x[:, 0] < right) & (y[:, 0] >= top) & (y[:, 0] < bottom)
-            part = np.ascontiguousarray(image[top : bottom + 1, left : right + 1])
-            which = np.flatnonzero(inside)
-            for start in range(0, len(which), _ROWS):
-                some = which[start : start + _ROWS]
-                at = x[some] - np.float32(left), y[some] - np.float32(top)
-                values[some] = cv2.remap(part, *at, cv2.INTER_LINEAR)
+            across = x[0, rows]
+            which = rows[(across >= left) & (across < right)]
+            part = image[top : bottom + 1, left : right + 1] if which.size else image
+            for start in range(0, which.size, _POINTS):
+                some = which[start : start + _POINTS]
+                at = x[:, some] - np.float32(left), y[:, some] - np.float32(top)
+                values[:, some] = cv2.remap(part, *at, cv2.INTER_LINEAR)
     return values.reshape(shape)
 
 

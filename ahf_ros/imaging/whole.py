@@ -15,10 +15,10 @@ from tempfile import mkstemp
 import cv2
 import numpy as np
 
+from ahf_ros.imaging.png import is_png, png_chunks
 from ahf_ros.imaging.tiff import first_directory, is_tiff
 from ahf_ros.text import printable
 
-_PNG = b'\x89PNG\r\n\x1a\n'
 _JPEG = b'\xff\xd8'
 _END, _SCAN = 0xD9, 0xDA  # markers of JPEG
 _ALONE = frozenset((0x01, *range(0xD0, 0xD9)))  # markers without a segment
@@ -47,7 +47,7 @@ def damage(data: bytes) -> str:
     try:
         if data.startswith(_JPEG):
             return '' if _jpeg_ends(data) else 'it has no end marker, so it is cut'
-        if data.startswith(_PNG):
+        if is_png(data):
             return _png_damage(data)
         if is_tiff(data):
             return _tiff_damage(data)
@@ -64,7 +64,7 @@ def decoded(data: np.ndarray, flags: int) -> tuple[np.ndarray | None, str]:
     """
     content = data.tobytes()
     seen = damage(content)
-    if content.startswith(_PNG) and not _is_credible(content):
+    if is_png(content) and not _is_credible(content):
         return None, seen
     with _lock, _standard_error() as said:
         image = cv2.imdecode(data, flags)
@@ -143,16 +143,12 @@ def _jpeg_ends(data: bytes) -> bool:
 
 def _png_damage(data: bytes) -> str:
     view = memoryview(data)
-    place = len(_PNG)
-    while True:
-        size, kind = struct.unpack_from('>L4s', data, place)
-        (checksum,) = struct.unpack_from('>L', data, place + 8 + size)
+    for kind, place, size in png_chunks(data):
+        (checksum,) = struct.unpack_from('>L', data, place + size)
         critical = kind[0] & 0x20 == 0
-        if critical and zlib.crc32(view[place + 4 : place + 8 + size]) != checksum:
+        if critical and zlib.crc32(view[place - 4 : place + size]) != checksum:
             return f'the checksum of its chunk {printable(kind.decode("latin-1"))} is wrong'
-        if kind == b'IEND':
-            return ''
-        place += 12 + size
+    return ''
 
 
 def _is_credible(data: bytes) -> bool:
@@ -161,13 +157,9 @@ def _is_credible(data: bytes) -> bool:
     A decoder takes the memory for a chunk before it looks whether that is there: 4 GB at most.
     """
     with suppress(struct.error):
-        width, height = struct.unpack_from('>LL', data, len(_PNG) + 8)
-        place = len(_PNG)
-        while place < len(data):
-            (size,) = struct.unpack_from('>L', data, place)
-            if size > _LARGEST_PIXEL * width * height + _BESIDE:
-                return False
-            place += 12 + size
+        width, height = struct.unpack_from('>LL', data, 16)
+        most = _LARGEST_PIXEL * width * height + _BESIDE
+        return all(size <= most for _, _, size in png_chunks(data))
     return True
 
 

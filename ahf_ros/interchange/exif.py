@@ -11,6 +11,7 @@ from typing import Any
 
 from ahf_ros.extras import need
 from ahf_ros.imaging.headers import read_header
+from ahf_ros.imaging.heic import register_heic
 from ahf_ros.opening import Most, opened, reader
 
 FILM_DIAGONAL = math.hypot(36, 24)
@@ -46,6 +47,7 @@ def read_exif(path: str | Path) -> tuple[Exif, tuple[int, int]]:
     need('orient', 'PIL')
     from PIL import Image, UnidentifiedImageError
 
+    register_heic()
     try:
         with opened(path, Most.IMAGE) as file, warnings.catch_warnings():
             warnings.simplefilter('ignore')  # large images, damaged fields

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import struct
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -11,8 +10,10 @@ import cv2
 import numpy as np
 
 from ahf_ros.deprecation import deprecated_arguments
-from ahf_ros.imaging.headers import UPRIGHT, read_header
-from ahf_ros.imaging.image import check_size, without_gaps
+from ahf_ros.extras import missing
+from ahf_ros.imaging.headers import HEIC, UPRIGHT, read_header
+from ahf_ros.imaging.heic import ENDINGS, decoded_heic
+from ahf_ros.imaging.image import as_oriented, check_size, without_gaps
 from ahf_ros.imaging.whole import decoded
 from ahf_ros.opening import Most, read_bytes, reader
 from ahf_ros.writing import write_whole
@@ -21,20 +22,13 @@ SUFFIXES = ('.bmp', '.jpeg', '.jpg', '.png', '.tif', '.tiff')
 """Endings of the image files that are tested; others are tried."""
 
 _LAST_ORIENTATION = 8
-_OTHERS = tuple(
-    (kind, re.compile(begin, re.DOTALL))
-    for kind, begin in (
-        ('HEIC', rb'....ftyp(hei|hev|mif1|msf1)'),
-        ('AVIF', rb'....ftypavi'),
-        ('JPEG XL', rb'\xff\x0a|\0\0\0\x0cJXL '),
-        ('JPEG 2000', rb'\0\0\0\x0cjP  |\xff\x4f\xff\x51'),
-        ('a raw image', rb'....ftypcrx |FUJIFILMCCD-RAW|IIR[OS]|MMOR|IIU\0|FOVb'),
-    )
-)
-"""Formats of cameras that a decoder may not know, by the bytes that they begin with."""
-
 _ACCEPTED = f'accepted is one of {", ".join(SUFFIXES)}'
 _ADVICE = f'{_ACCEPTED}: convert it in full size to 16-bit TIFF or PNG, without lens corrections'
+
+
+def image_suffixes() -> tuple[str, ...]:
+    """Return the endings of the files that are taken for images: of HEIC where that is read."""
+    return SUFFIXES if missing('heic') else (*SUFFIXES, *ENDINGS)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -104,20 +98,6 @@ def read_noted_image(path: str | Path, *, upright: bool = False) -> NotedImage:
     return replace(noted, image=image, note='; '.join(filter(None, (noted.note, note))))
 
 
-def as_oriented(image: np.ndarray, orientation: int) -> np.ndarray:
-    """Return an image turned upright, from its orientation in Exif (CIPA DC-008, table 4).
-
-    Orientations other than 1 to 8 are `UPRIGHT`.
-    """
-    if orientation in (5, 6, 7, 8):
-        image = image.T
-    if orientation in (3, 4, 7, 8):
-        image = image[::-1]
-    if orientation in (2, 3, 6, 7):
-        image = image[:, ::-1]
-    return np.ascontiguousarray(image)
-
-
 def decode_bytes(encoded: bytes, name: str) -> NotedImage:
     """Return an encoded image with the gray values that `read_image` returns.
 
@@ -131,6 +111,9 @@ def _decoded(content: bytes, name: str) -> NotedImage:
     if not content:
         raise ValueError(f'{name} is empty, accepted is an image')
     header = read_header(content)
+    if header.kind == HEIC and not missing('heic'):
+        pixels, note = decoded_heic(content, name)
+        return NotedImage(pixels, note=note)
     if header.raw:
         raise ValueError(f'{name} is a raw image, {_ADVICE}')
     check_size(header.width, header.height, name)
@@ -145,9 +128,10 @@ def _decoded(content: bytes, name: str) -> NotedImage:
     except cv2.error as error:  # for instance if the header says that the image is too large
         raise ValueError(f'{name} cannot be decoded: {error.err}') from error
     if image is None:
+        if header.kind:
+            more = f'; {missing("heic")}' if header.kind == HEIC else ''
+            raise ValueError(f'{name} is {header.kind}, {_ADVICE}{more}')
         what = f'is damaged: {damage}' if damage else 'is not an image, or is damaged'
-        if kind := next((kind for kind, begin in _OTHERS if begin.match(content)), ''):
-            raise ValueError(f'{name} is {kind}, {_ADVICE}')
         raise ValueError(f'{name} {what}; {_ACCEPTED}')
     note = f'{name} has {header.pages} pages, the first is read' if header.pages > 1 else ''
     return NotedImage(without_gaps(image), header.orientation, note, damage)
@@ -179,5 +163,4 @@ def write_image(path: str | Path, image: np.ndarray) -> None:
     path = Path(path)
     if path.suffix.lower() not in SUFFIXES:
         raise ValueError(f'{path} has an unknown format, accepted is one of {", ".join(SUFFIXES)}')
-    _, encoded = cv2.imencode(path.suffix, image)
-    write_whole(path, encoded.tobytes())
+    write_whole(path, cv2.imencode(path.suffix, image)[1].tobytes())

@@ -33,6 +33,7 @@ _AIMED = 1.2  # times the bytes of the medium quality: the one above it
 _REDUCED = 0.85  # the same for a picture that has to be smaller; it keeps more pixels
 _MAXIMUM_STEP = 6.0  # from one size to the next, in pixels
 _MAXIMUM_WEBP = 2_000_000  # px; it takes 0.6 s per million
+_MAXIMUM_WEBP_SIDE = 16_383  # px, of the format
 _MINIMUM_SIDE = 16  # px, the longer side
 
 
@@ -180,7 +181,8 @@ def _resized(image: np.ndarray, scale: float) -> np.ndarray:
 
 def _encoded(image: np.ndarray, quality: int) -> Picture:
     height, width = image.shape
-    if image.size <= _MAXIMUM_WEBP and cv2.haveImageWriter('.webp'):
+    small = image.size <= _MAXIMUM_WEBP and max(image.shape) <= _MAXIMUM_WEBP_SIDE
+    if small and cv2.haveImageWriter('.webp'):
         _, content = cv2.imencode('.webp', image, [cv2.IMWRITE_WEBP_QUALITY, quality])
         return Picture(content.tobytes(), 'image/webp', width, height)
     _, content = cv2.imencode('.jpg', image, [cv2.IMWRITE_JPEG_QUALITY, quality])

@@ -27,6 +27,7 @@ from ruamel.yaml import YAML
 
 from ahf_ros.bag import source as sources
 from ahf_ros.bag.definitions import COMPRESSED_IMAGE, IMAGE, MAXIMUM_DEFINITION, typestore
+from ahf_ros.bag.mcap_records import add_checksums
 from ahf_ros.bag.output import Journal
 from ahf_ros.bag.source import Source
 from ahf_ros.cli import main
@@ -489,6 +490,25 @@ def test_chunks_are_written_with_their_checksums(tmp_path: Path) -> None:
         chunks = [it for it in reader.records if isinstance(it, Chunk)]
     assert chunks
     assert all(it.uncompressed_crc == crc32(it.data) for it in chunks)
+
+
+@pytest.mark.parametrize('indexed', [True, False])
+def test_chunks_without_checksums_are_said_once(
+    indexed: bool, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    messages = [(1, it, data) for it, data in enumerate(serialized(), start=1)]
+    for name, checked in (('checked', True), ('bare', False)):
+        chunks = [mcap.chunk(mcap.message(*it), it[1], it[1], checksum=checked) for it in messages]
+        if indexed:
+            source = recorded(tmp_path / name)
+            if checked:
+                add_checksums(next(source.glob('*.mcap')))
+        else:
+            file = mcap.McapFile([*IMAGES])
+            file.records += chunks
+            source = file.write(tmp_path / f'{name}.mcap')
+        assert status(source, tmp_path / f'{name} out') == 0
+        assert capfd.readouterr().err.count('no checksums') == (not checked)
 
 
 def test_an_output_in_the_recording_is_refused(tmp_path: Path, capfd) -> None:

@@ -98,6 +98,8 @@ def test_what_does_not_belong_together_is_said_and_answered(phases, tmp_path):
     outcome = answer_bag(task, lambda done, total, remark: said.append(remark))
     assert stamps(task.output) == [20, 30, 50, 10]
     assert (outcome.images, outcome.refused) == (5, 1)
+    about, *said = said
+    assert 'checksums' in about
     assert said[:2] == ['', '']
     assert '2 of 3 images: the next image is 400 x 280 px, mono8, these are 400 x 300' in said[2]
     assert '1 of 3 images: the stamp of the next image is 2 s earlier' in said[3]

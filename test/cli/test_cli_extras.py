@@ -100,6 +100,18 @@ def test_a_url_does_so_with_its_name(
     )
 
 
+def test_so_does_an_image_of_a_phone(
+    tmp_path: Path, take_away: Callable[[str], str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / 'a.heic'
+    path.write_bytes(b'\0\0\0\x18ftypheic' + bytes(100))
+    said = take_away('heic')
+    assert status('identify', path) == 1
+    error = capsys.readouterr().err
+    assert f'{path} is HEIC, accepted is' in error
+    assert f'; {said}' in error
+
+
 def test_so_do_completion_and_tables(
     take_away: Callable[[str], str],
     monkeypatch: pytest.MonkeyPatch,
@@ -149,7 +161,7 @@ def test_extras_are_those_of_the_package() -> None:
     assert tuple(re.findall(r'^  "([\w.-]*\w)', required, re.MULTILINE)) == REQUIRED
     (names,) = re.findall(r'^all = \["ahf_ros\[(.*)\]"\]$', text, re.MULTILINE)
     assert set(names.split(',')) == set(EXTRAS)
-    distributions = {'PIL': 'pillow'}
+    distributions = {'PIL': 'pillow', 'pillow_heif': 'pillow-heif'}
     for extra, (_, modules) in EXTRAS.items():
         (brought,) = re.findall(rf'^{extra} = \[(.*)\]$', text, re.MULTILINE)
         required = set(re.findall(r'"([\w-]+)', brought))

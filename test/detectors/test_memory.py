@@ -8,12 +8,9 @@ import numpy as np
 import pytest
 
 from ahf_ros import create_identifier
-from ahf_ros.features import candidates, small_dots
+from ahf_ros.features import candidates, log_edges, small_dots
 from ahf_ros.imaging.image import as_gray
 from support.scenes import rendering
-
-MAXIMUM_BYTES = 24.0
-"""A pixel, of an image with 16 bits, which takes two of them."""
 
 
 def peak_of(work) -> int:
@@ -26,18 +23,32 @@ def peak_of(work) -> int:
         tracemalloc.stop()
 
 
-def test_an_image_with_16_bits_takes_24_bytes_a_pixel(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize(
+    ('family', 'bits', 'most'),
+    [
+        ('metashape12', 16, 14.5),
+        ('metashape12,cctag3', 8, 16.0),
+    ],
+)
+def test_a_pixel_takes_so_many_bytes(
+    family: str, bits: int, most: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
     # Parts as small beside this image as they are beside one of 100 MP.
-    for module, name in ((candidates, '_MOST_CELLS'), (small_dots, '_STRIP')):
+    for module, name in (
+        (candidates, '_FIELD'),
+        (candidates, '_MOST_CELLS'),
+        (log_edges, '_BAND'),
+        (small_dots, '_STRIP'),
+    ):
         monkeypatch.setattr(module, name, getattr(module, name) // 32)
     shown = rendering(width=2000, height=1500, targets=4, light='stripe', ambient=0.3, seed=5)
-    image = shown.image.astype(np.uint16) * 200
-    identifier = create_identifier(family='metashape12', threads=1)
+    image = shown.image if bits == 8 else shown.image.astype(np.uint16) * 200
+    identifier = create_identifier(family=family, threads=1)
     identifier.identify(image[:600, :800])  # modules are imported, tables made
     found = []
     peak = peak_of(lambda: found.append(identifier.identify(image.copy())))
     assert len(found[0].targets) == 4
-    assert peak < MAXIMUM_BYTES * image.size
+    assert peak < most * image.size
 
 
 def test_gray_values_of_16_bits_are_scaled_without_copies() -> None:

@@ -110,6 +110,18 @@ def test_of_neighbours_the_highest_is_kept():
     assert highest(cells, np.array([2.0, 3.0, 1.0]), (40, 60), 2).tolist() == [False, True, True]
 
 
+def test_cells_of_large_images_are_compared_in_bands(monkeypatch: pytest.MonkeyPatch) -> None:
+    generator = np.random.default_rng(1)
+    shape, reach = (400, 60), 3
+    inside = np.pad(np.ones((394, 54), bool), reach)
+    cells = generator.permutation(np.flatnonzero(inside))[:4000]
+    values = generator.integers(1, 9, len(cells)).astype(np.float32)
+    whole = highest(cells, values, shape, reach)
+    monkeypatch.setattr(candidates, '_FIELD', 40 * 60)
+    assert np.array_equal(highest(cells, values, shape, reach), whole)
+    assert 50 < whole.sum() < 2000
+
+
 def test_votes_of_large_images_are_counted_in_parts(monkeypatch: pytest.MonkeyPatch) -> None:
     dots = [(80.0, 80.0, 12.0), (200.0, 90.0, 20.0, 9.0, 0.5), (120.0, 180.0, 5.0)]
     gray = in_stripes(drawn(dots), 31, 0.4)

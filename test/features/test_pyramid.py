@@ -7,26 +7,30 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from ahf_ros.features.log_edges import LOG_SCALE, find_edges
-from ahf_ros.features.pyramid import halved, image_pyramid, log_image, octaves
+from ahf_ros.features import log_edges
+from ahf_ros.features.log_edges import LOG_SCALE, LogEdges, edges_in_bands, find_edges
+from ahf_ros.features.pyramid import MINIMUM_ASPECT, halved, image_pyramid, log_image, octaves
 from ahf_ros.imaging.logarithm import LOG_OFFSET
 
 IMAGE = np.random.default_rng(0).integers(0, 256, (300, 1700)).astype(np.uint8)
 
 
-def bounds(low: float, high: float) -> list[tuple[float, float]]:
+def bounds(low: float, high: float, image: np.ndarray = IMAGE) -> list[tuple[float, float]]:
     """Return the radii of the octaves, px of the image."""
-    pyramid = image_pyramid(IMAGE, high)
+    pyramid = image_pyramid(image, high)
     return [
         (it.radii[0] * 2**it.level, it.radii[1] * 2**it.level)
         for it in octaves(pyramid, low, high)
     ]
 
 
-def test_every_radius_up_to_half_of_the_image_is_in_an_octave():
-    every = bounds(4.0, 1e4)
+@pytest.mark.parametrize('shape', [(300, 1700), (900, 1700), (1700, 900), (17, 1700)])
+def test_every_radius_of_a_dot_that_fits_into_the_image_is_in_an_octave(shape: tuple[int, int]):
+    image = np.resize(IMAGE, shape)
+    every = bounds(4.0, 1e4, image)
     assert every[0][0] == 4
-    assert every[-1][1] >= IMAGE.shape[1] / 2
+    largest = min(max(shape), min(shape) / MINIMUM_ASPECT) / 2
+    assert largest <= every[-1][1] < max(4 * largest, 93)
     for (_, end), (start, _) in pairwise(every):
         assert 0.9 * end < start < end
 
@@ -86,3 +90,33 @@ def test_edges_lie_on_steps_and_point_to_the_bright_side():
     assert set(edges.x) <= {40, 41}
     assert edges.unit_x == pytest.approx(1, abs=1e-6)
     assert edges.unit_y == pytest.approx(0, abs=1e-6)
+
+
+def test_edges_of_large_images_are_listed_in_bands(monkeypatch: pytest.MonkeyPatch) -> None:
+    log = log_image(IMAGE)
+    whole = find_edges(log).curved(6.0)
+    monkeypatch.setattr(log_edges, '_BAND', 70 * log.shape[1])
+    monkeypatch.setattr(log_edges, '_PART', 999)
+    bands = [*edges_in_bands(log)]
+    parts = LogEdges.joined(bands).curved(6.0)
+    assert len(bands) == 5
+    assert 1000 < len(whole.x) < len(find_edges(log).x)
+    for name in ('x', 'y', 'unit_x', 'unit_y', 'strength'):
+        assert np.array_equal(getattr(whole, name), getattr(parts, name))
+
+
+@pytest.mark.parametrize('contrast', [2, 3])
+def test_contrast_multiplies_the_steps_of_a_logarithm(contrast: int) -> None:
+    (multiplied,) = edges_in_bands(contrast * log_image(IMAGE))
+    (edges,) = edges_in_bands(log_image(IMAGE), contrast)
+    assert len(edges.x) > 1000
+    assert np.array_equal(edges.marked, multiplied.marked)
+    assert np.array_equal(edges.strength, multiplied.strength)
+
+
+def test_gray_values_are_those_of_the_image():
+    for image in (IMAGE, IMAGE.astype(np.float32)):
+        pyramid = image_pyramid(image, 60.0)
+        assert pyramid.gray.dtype == np.float32
+        assert np.array_equal(pyramid.gray, IMAGE)
+        assert pyramid.images[0] is image

@@ -19,7 +19,7 @@ def test_parts_give_the_values_of_the_whole(kind: type, monkeypatch: pytest.Monk
     y = generator.uniform(-5, 45, (30, 8)).astype(np.float32)
     whole = remapped(image, x, y)
     monkeypatch.setattr(resampling, 'LARGEST', 32)
-    monkeypatch.setattr(resampling, '_ROWS', 20)
+    monkeypatch.setattr(resampling, '_POINTS', 20)
     # Positions are rounded to a part of a pixel, in OpenCV 4 to 1/32.
     assert np.allclose(remapped(image, x, y), whole, atol=16)
     assert np.array_equal(remapped(image, np.stack([x, y], axis=-1), None), remapped(image, x, y))

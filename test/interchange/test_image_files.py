@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import struct
+import sys
 import zlib
 from pathlib import Path
 
@@ -12,6 +13,7 @@ import pytest
 
 from ahf_ros.cli import main
 from ahf_ros.cli.identify import image_paths
+from ahf_ros.extras import missing
 from ahf_ros.imaging.headers import read_header
 from ahf_ros.interchange.exif import read_exif
 from ahf_ros.interchange.image_files import (
@@ -266,7 +268,8 @@ def test_pages_and_raw_images_are_named():
         (b'FUJIFILMCCD-RAW 0201', 'a raw image'),
     ],
 )
-def test_formats_of_cameras_that_are_not_read_are_named(begin, kind):
+def test_formats_of_cameras_that_are_not_read_are_named(begin, kind, monkeypatch):
+    monkeypatch.setitem(sys.modules, 'pillow_heif', None)
     with pytest.raises(ValueError, match=rf'a is {kind}, accepted is .*convert it in full size'):
         decode_bytes(begin + bytes(100), 'a')
 
@@ -296,7 +299,8 @@ def test_missing_pixels_of_floats_are_0(tmp_path):
     assert np.isnan(read_image(tmp_path / 'a.tif')).all()  # for whoever checks images
 
 
-def test_what_is_left_out_of_a_folder_is_counted_by_kind(tmp_path):
+def test_what_is_left_out_of_a_folder_is_counted_by_kind(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, 'pillow_heif', None)
     for name in ('a.png', 'a.HEIC', 'b.heic', 'c.cr2', 'list'):
         (tmp_path / name).touch()
     (tmp_path / 'folder').mkdir()
@@ -305,3 +309,4 @@ def test_what_is_left_out_of_a_folder_is_counted_by_kind(tmp_path):
     assert [it.partition(';')[0] for it in left_out] == [
         f'{tmp_path}: left out are 2 .heic, 1 .cr2, 1 without an ending'
     ]
+    assert left_out[0].endswith(missing('heic'))

@@ -100,6 +100,8 @@ def test_pictures_take_no_more_bytes_than_they_may(monkeypatch: pytest.MonkeyPat
     assert fitted(smooth, 40_000).width > fitted(noise, 40_000).width
     assert fitted(smooth, 4_000_000).width == 1200
     assert fitted(noise[:40, :50], 10).width <= 16
+    long = np.resize(noise, (16, 32_767))  # WebP has no such sides
+    assert 0 < len(fitted(long, 400_000).content) <= 400_000
     small = thumbnail(noise)
     assert (small.width, small.height) == (117, 88)
     monkeypatch.setattr(images.cv2, 'haveImageWriter', lambda _: False)

@@ -40,12 +40,11 @@ from ahf_ros.features.dot_search import voted_dots, whole_dots
 from ahf_ros.features.dots import Dots
 from ahf_ros.features.ellipse_targets import ellipse_fields, targets_from_frames
 from ahf_ros.features.large_targets import targets_of_octaves
-from ahf_ros.features.log_edges import find_edges
+from ahf_ros.features.log_edges import LogEdges, edges_in_bands
 from ahf_ros.features.pyramid import ImagePyramid, Octave, image_pyramid, octaves
 from ahf_ros.imaging.image import as_gray, check_image
 from ahf_ros.target import UNDECODED, Target, sorted_targets
 
-_GAIN = 2  # of ln I, for circles that blur makes gray
 _COLOURS = 1, -1  # of circles that are looked for
 _SMALLEST, _SMALL = 2.0, 11.5  # radii of circles that are looked for, px, also in the half
 _BEYOND = 1.1  # times a bound of the radius, by how much circles may be beyond it
@@ -75,6 +74,7 @@ class CctagDetector(FamilyDetector):
     """Identify the CCTags of one family or of several."""
 
     name: ClassVar[str] = 'cctag'
+    contrast: ClassVar[int] = 2  # for circles that blur makes gray
 
     @property
     def design(self) -> tuple[CircleFamily, ...]:
@@ -84,19 +84,20 @@ class CctagDetector(FamilyDetector):
     def __call__(self, image: np.ndarray) -> list[Target]:
         """Identify the targets of one image; see `Detector`."""
         check_image(image)
-        return self.search(image_pyramid(as_gray(image), self.settings.max_radius))
+        gray = as_gray(image)
+        return self.search(image_pyramid(gray, self.settings.max_radius, self.contrast))
 
     @one_blas_thread()
     def search(self, pyramid: ImagePyramid) -> list[Target]:
         """Identify the targets of one image; see `Searching`."""
-        doubled, radii = _doubled(pyramid), self.settings.radii
+        pyramid, radii = _unclipped(pyramid), self.settings.radii
         kinds = list(product(self.settings.polarities, self.design))
-        looks = _looks(list(octaves(doubled, *radii)), kinds)
+        looks = _looks(list(octaves(pyramid, *radii)), kinds)
 
         def identify(octave: Octave) -> list[Target]:
             return self._identify(octave.pyramid.gray, looks[octave.level])
 
-        found = targets_of_octaves(doubled, radii, identify, self.refine)
+        found = targets_of_octaves(pyramid, radii, identify, self.refine)
         return sorted_targets(best_targets(found, 1.0))
 
     @one_blas_thread()
@@ -186,17 +187,19 @@ def _looks(
     """
     if not of_octaves:
         return {}
-    circles = [
-        Circles.at(octave.pyramid.gray, dots, number, largest)
-        for number, (octave, of) in enumerate(zip(of_octaves, _circles(of_octaves), strict=True))
-        for dots, largest in ((of, LARGEST), *_common_centres(octave))
-    ]
+    circles = []
+    for number, (octave, of) in enumerate(zip(of_octaves, _circles(of_octaves), strict=True)):
+        for dots, largest in ((of, LARGEST), *_common_centres(octave)):
+            circles.append(Circles.at(octave.pyramid.gray, dots, number, largest))
     every = Circles.joined(circles)
     if not len(every.frames):
         return {octave.level: [] for octave in of_octaves}
     frames = likely_rings(every, [it.radii for it in of_octaves], kinds)
-    images = [it.pyramid.gray for it in of_octaves]
-    lights = [of for part in (_FULL, _HALVES) for of in _first_lights(images[part], frames[part])]
+    lights = [
+        of
+        for part in (_FULL, _HALVES)
+        for of in _first_lights([it.pyramid for it in of_octaves[part]], frames[part])
+    ]
     return {
         octave.level: [_Look(*it) for it in zip(*zip(*kinds, strict=True), *of, strict=True)]
         for octave, *of in zip(of_octaves, frames, lights, strict=True)
@@ -204,16 +207,16 @@ def _looks(
 
 
 def _first_lights(
-    images: Sequence[np.ndarray], frames: Sequence[Sequence[np.ndarray]]
+    pyramids: Sequence[ImagePyramid], frames: Sequence[Sequence[np.ndarray]]
 ) -> list[list[Lights]]:
     """Return light of one edge about the first frames of all kinds in images.
 
     Frames that do not show the same all around have none, nor those that no edge of light could
     make do so. The images are read as one.
     """
-    if not images:
+    if not pyramids:
         return []
-    stacked, places = _stacked(images)
+    stacked, places = _stacked(pyramids)
     first = [
         [frame.translated(it[:_IN_A_ROW], *place) for it in of]
         for place, of in zip(places, frames, strict=True)
@@ -233,18 +236,21 @@ def _first_lights(
     return found
 
 
-def _stacked(images: Sequence[np.ndarray]) -> tuple[np.ndarray, list[tuple[int, int]]]:
+def _stacked(pyramids: Sequence[ImagePyramid]) -> tuple[np.ndarray, list[tuple[int, int]]]:
     """Return images above one another, with their borders repeated, and where they are, px."""
-    if len(images) == 1:
-        return images[0], [(0, 0)]
-    wide = max(it.shape[1] for it in images)
-    sides = [(_BORDER, _BORDER, _BORDER, _BORDER + wide - it.shape[1]) for it in images]
-    bordered = [
-        cv2.copyMakeBorder(it, *of, cv2.BORDER_REPLICATE)
-        for it, of in zip(images, sides, strict=True)
-    ]
-    tops = np.cumsum([_BORDER, *(len(it) for it in bordered[:-1])]).tolist()
-    return np.concatenate(bordered), [(_BORDER, top) for top in tops]
+    if len(pyramids) == 1:
+        return pyramids[0].gray, [(0, 0)]
+    shapes = [it.image.shape for it in pyramids]
+    wide = max(width for _, width in shapes)
+    bottoms = np.cumsum([height + 2 * _BORDER for height, _ in shapes]).tolist()
+    stacked = np.empty((bottoms[-1], wide + 2 * _BORDER), np.float32)
+    places = []
+    for it, bottom, (height, width) in zip(pyramids, bottoms, shapes, strict=True):
+        top = bottom - height - 2 * _BORDER
+        sides = _BORDER, _BORDER, _BORDER, _BORDER + wide - width
+        cv2.copyMakeBorder(it.gray, *sides, cv2.BORDER_REPLICATE, stacked[top:bottom])
+        places.append((_BORDER, top + _BORDER))
+    return stacked, places
 
 
 def _identified(gray: np.ndarray, look: _Look) -> tuple[Aligned, np.ndarray]:
@@ -399,9 +405,7 @@ def _circles(of_octaves: Sequence[Octave]) -> list[Dots]:
     high = last.radii[1] * 2 ** (last.level - first.level)
     voted = voted_dots(pyramid, max(low * _INNERMOST, _SMALLEST), high, _COLOURS)
     if len(pyramid.halves) > 1:
-        gray, *halves = pyramid.halves
-        half = ImagePyramid(gray, tuple(halves), pyramid.logs[1:], pyramid.edges[1:])
-        others = voted_dots(half, max(low / 2, _SMALLEST), _SMALL, _COLOURS)
+        others = voted_dots(pyramid.half(1), max(low / 2, _SMALLEST), _SMALL, _COLOURS)
         others = replace(others, frames=frame.enlarged(others.frames, 1))
         voted = Dots.joined([voted, others])
     major = frame.ellipse_axes(voted.frames)[0]
@@ -428,8 +432,7 @@ def _common_centres(octave: Octave) -> list[tuple[Dots, float]]:
     if octave.level or low >= high:
         return []
     log = octave.pyramid.logs[0]
-    edges = find_edges(cv2.addWeighted(log, _FAINT, log, 0.0, -_FAINT * cv2.mean(log)[0]))
-    edges = edges.curved(2 * _FACING)
+    edges = LogEdges.joined([it.curved(2 * _FACING) for it in edges_in_bands(log, _FAINT)])
     most = int(_MOST_FAINT * log.size)
     if len(edges.x) > most:
         weakest = np.partition(edges.strength, -most)[-most]
@@ -448,12 +451,9 @@ def _common_centres(octave: Octave) -> list[tuple[Dots, float]]:
     return [(centres, high / low)]
 
 
-def _doubled(pyramid: ImagePyramid) -> ImagePyramid:
-    """Return a pyramid with twice the contrast of ln I, whose gray values are not clipped."""
-    logs = tuple(_GAIN * log for log in pyramid.logs)
-    edges = tuple(find_edges(log) for log in logs[1:])
-    doubled = replace(pyramid, logs=logs, edges=edges, common=None)
-    if not is_drawing(pyramid.gray):
-        return doubled
+def _unclipped(pyramid: ImagePyramid) -> ImagePyramid:
+    """Return a pyramid whose gray values are not clipped."""
+    if not is_drawing(pyramid.image):
+        return pyramid
     halves = tuple(of_drawing(half) for half in pyramid.halves)
-    return replace(doubled, gray=of_drawing(pyramid.gray), halves=halves)
+    return replace(pyramid, image=of_drawing(pyramid.gray), halves=halves)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
+from typing import ClassVar
 
 import numpy as np
 
@@ -66,6 +67,7 @@ class RingDetector:
     settings: DetectorSettings
     expected: frozenset[int] = frozenset()
     contested: bool = False
+    contrast: ClassVar[int] = 1  # see `Searching`
 
     @property
     def name(self) -> str:
@@ -129,7 +131,7 @@ def hypotheses_in(
 ) -> Hypotheses:
     """Find the dots and words in an image pyramid; see `find_hypotheses`."""
     found = read_pyramid(pyramid, settings, expected, PROPOSALS)
-    for part in faint_parts(pyramid.gray):
+    for part in faint_parts(pyramid.image):
         seen = read_image(part.gray, settings, expected, (propose_whole,))
         seen = seen.select(seen.certain)
         seen = replace(seen, frames=frame.translated(seen.frames, part.x, part.y))
@@ -200,15 +202,17 @@ def read_pyramid(
     described: Sequence[Family] = settings.codes(Family)
     families, polarities = described, settings.polarities
     shown = list(families if len(families) == 1 else shown)
-    images = (pyramid.gray, *pyramid.halves)
+    images = pyramid.images
     nothing = Hypotheses.unread(NO_FITS, families[0])
     seen = _Seen((nothing,), Explained.by(nothing))
     measured: list[tuple[Octave, Fit]] = []
     every = settings.report_undecoded
     for octave in octaves(pyramid, *settings.radii):
-        part, fits = octave.pyramid.gray, [NO_FITS]
+        fits = [NO_FITS]
         for propose in proposals:
+            part = None  # proposals take memory of their own
             proposed = propose(octave, polarities, seen.explained)
+            part = octave.pyramid.gray
             proposed = with_rims(proposed, families, octave.radii[0])
             dots = measure_dots(part, proposed, covariances=every)
             families = with_measured_bands(part, dots, families)
@@ -224,15 +228,11 @@ def read_pyramid(
                 likely, others = measure_likely(part, dots, None if every else codes)
             unread = Hypotheses.unread(others, families[0])
             seen = seen.after(at_full_size(images[: octave.level + 1], unread))
-            seen = _read(octave, images, likely, codes, seen, expected, every=every)
+            seen = _read(part, octave, images, likely, codes, seen, expected, every=every)
             fits.append(dots)
         measured.append((octave, Fit.joined(fits)))
     for octave, _ in measured if shown else ():
-        alike = seen.targets.alike(octave)
-        if len(alike.frames):
-            likely = measure_alike(octave.pyramid.gray, alike)
-            later = _read(octave, images, likely, shown, seen, expected, every=False)
-            seen = seen.with_targets(later)  # all else was read in the shape of the dots
+        seen = _with_alike(octave, images, shown, seen, expected)
     for octave, dots in measured:
         part = octave.pyramid.gray
         while True:
@@ -246,7 +246,7 @@ def read_pyramid(
             clear = seen.explained.select(seen.explained.clear)
             dots = dots.select(~clear.on_them(dots.frames, octave.level))
             likely, _ = measure_likely(part, dots, codes)
-            seen = _read(octave, images, likely, codes, seen, expected, every=every)
+            seen = _read(part, octave, images, likely, codes, seen, expected, every=every)
             shown = shown + codes
     read = Hypotheses.joined(seen.found)
     if len(shown) > 1:
@@ -256,7 +256,29 @@ def read_pyramid(
     return replace(read, families=np.array(as_described, object))
 
 
+def _with_alike(
+    octave: Octave,
+    images: Sequence[np.ndarray],
+    codes: Sequence[Family],
+    seen: _Seen,
+    expected: frozenset[int],
+) -> _Seen:
+    """Return what is seen once dots in the shapes of certain targets about them are read as well.
+
+    All else was read in the shape of the dots.
+    """
+    alike = seen.targets.alike(octave)
+    if not len(alike.frames):
+        return seen
+    gray = octave.pyramid.gray
+    likely = measure_alike(gray, alike)
+    return seen.with_targets(
+        _read(gray, octave, images, likely, codes, seen, expected, every=False)
+    )
+
+
 def _read(
+    gray: np.ndarray,
     octave: Octave,
     images: Sequence[np.ndarray],
     dots: Fit,
@@ -266,7 +288,7 @@ def _read(
     *,
     every: bool,
 ) -> _Seen:
-    """Return what is seen once dots of an octave are read, the most hopeful ones first.
+    """Return what is seen once dots are read in the image of an octave, the most hopeful first.
 
     Thousands of spots of light or letters look a little like dots with a band. They are mostly of
     one colour, and must not crowd out the other. Where a part of the dots of a colour shows no
@@ -276,7 +298,7 @@ def _read(
     while any(len(of.frames) for of in left):
         part = Fit.joined([of.select(slice(_PART)) for of in left])
         prior = seen.prior(expected, octave.level)
-        read = read_families(octave.pyramid.gray, part, codes, prior)
+        read = read_families(gray, part, codes, prior)
         seen = seen.after(at_full_size(images[: octave.level + 1], read))
         shown = set(read.polarity[read.certain])
         for index, polarity in enumerate((1, -1)):

@@ -63,16 +63,19 @@ def find_quadrilaterals(gray: np.ndarray) -> np.ndarray:
         values = cv2.LUT(gray, table)
         low, high = cv2.erode(values, window), cv2.dilate(values, window)
         middle = cv2.addWeighted(low, 0.5, high, 0.5, 0)
-        height = cv2.subtract(high, low)
-        _, step = cv2.threshold(height, _MINIMUM_STEP, 255, cv2.THRESH_BINARY)
-        dark = cv2.bitwise_and(cv2.compare(values, middle, cv2.CMP_LT), step)
-        traced.append((dark, growth))
+        step = cv2.subtract(high, low, high)  # in place, as the next: large images need no copies
+        cv2.threshold(step, _MINIMUM_STEP, 255, cv2.THRESH_BINARY, step)
+        dark = cv2.compare(values, middle, cv2.CMP_LT, low)
+        cv2.bitwise_and(dark, step, dark)
+        del low, high, middle, step
+        traced.append((_outlines(dark), growth))
     # Squares that touch at their corners, such as those of an AprilGrid, hang together by a few
     # pixels. Without their outermost pixels they do not.
-    traced.append((cv2.erode(dark, np.ones((3, 3), np.uint8)), growth + 1))
-    outlines = [_outlines(dark) for dark, _ in traced]
-    growths = np.repeat([growth for _, growth in traced], [*map(len, outlines)])
-    regions = _regions([*chain(*outlines)], growths)
+    traced.append((_outlines(cv2.erode(dark, np.ones((3, 3), np.uint8))), growth + 1))
+    del dark
+    growths = np.repeat([growth for _, growth in traced], [len(of) for of, _ in traced])
+    regions = _regions([*chain(*(of for of, _ in traced))], growths)
+    del traced
     sides, four = _four_sides(regions)
     bordered = _bordered(values, sides, regions.areas[four])
     lines = _fitted(regions, four[bordered], sides[bordered])
