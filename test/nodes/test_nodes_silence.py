@@ -97,7 +97,8 @@ def test_an_hour_of_a_triggered_scanner_has_no_warning_and_its_end_has_one(
     command = sys.executable, '-c', DRIVER, '/silent/image'
     with subprocess.Popen(command, env=environment) as driver:
         try:
-            graph.until(lambda: len(detector.targets) > len(stamps))
+            # The node has then looked at its publisher, too.
+            graph.until(lambda: int(detector.told('answered')) > len(stamps))
         finally:
             driver.kill()
     said.clear()
