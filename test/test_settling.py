@@ -104,10 +104,7 @@ WALL = SceneSettings(width=1200, height=900, targets=12, dot_radius=9, seed=3)
 
 def side_by_side(*families: str) -> np.ndarray:
     return np.hstack(
-        [
-            render(replace(WALL, width=450, height=600, targets=6, family=it)).image
-            for it in families
-        ]
+        [render(replace(WALL, width=600, targets=8, family=it)).image for it in families]
     )
 
 
@@ -194,7 +191,7 @@ def test_a_second_family_in_any_image_of_a_batch_is_found(
     assert status('identify', tmp_path, '--json') == 0
     said = capsys.readouterr()
     last = json.loads(said.out.splitlines()[-1])
-    assert Counter(it['family'] for it in last['targets']) == {'cct10': 6, 'aruco_5x5_50': 6}
+    assert Counter(it['family'] for it in last['targets']) == {'cct10': 8, 'aruco_5x5_50': 8}
     assert 'families: aruco_5x5_50, cct10\n' in said.err
 
 
