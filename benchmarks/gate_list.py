@@ -67,7 +67,7 @@ _VOTED = [
     Gate('second round', 'features.ellipses:_WINDOWS', _without_shares(1)),
     Gate('third round', 'features.ellipses:_WINDOWS', _without_shares(2)),
     Gate('all rounds', 'features.ellipses:_WINDOWS', _without_shares(0, 1, 2)),
-    Gate('flat ellipses', 'features.ellipses:_MINIMUM_ASPECT', '0.0'),
+    Gate('flat ellipses', 'features.pyramid:MINIMUM_ASPECT', '1e-9'),
     Gate('narrow ellipses', 'features.ellipses:_MINIMUM_MINOR', '0.0'),
     Gate('ellipses beyond their range', 'features.ellipses:_OVERSIZE', _EVERY),
 ]
