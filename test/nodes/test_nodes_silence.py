@@ -103,7 +103,6 @@ def test_an_hour_of_a_triggered_scanner_has_no_warning_and_its_end_has_one(
             driver.kill()
     said.clear()
     detector.says('nobody publishes sensor_msgs/msg/Image on /silent/image')
-    assert graph.node.count_publishers('/silent/image') == 1
     assert detector.process.end()[0] == 0
 
 
