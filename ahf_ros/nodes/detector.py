@@ -59,6 +59,9 @@ ACTIVE = 'active'
 NO_ANSWERS = '/diagnostics', '/parameter_events'
 """Topics that are published without images."""
 
+MATCHING = 0.1
+"""Time within which a node notices who subscribes to answers, s."""
+
 IDLE = 3.0
 """Time without an image after which a node gives back the memory that it keeps for the next, s."""
 
@@ -105,6 +108,8 @@ class DetectorNode(ProcessNode, LifecycleNodeMixin):
             self.create_service(kind, service, respond, qos_profile=kept, callback_group=group)
         self._managed = False
         self._begin()
+        self._matcher = threading.Thread(target=self._look_for_subscribers, daemon=True)
+        self._matcher.start()
 
     def _begin(self) -> None:
         """Configure and activate, or let others do it. Raises a ValueError if it cannot."""
@@ -187,6 +192,15 @@ class DetectorNode(ProcessNode, LifecycleNodeMixin):
         with self._matching:
             self.listen(self._active and self._asked())
 
+    def _look_for_subscribers(self) -> None:
+        """Take note of who begins or ceases to ask for answers, until the node stops.
+
+        No events of publishers say so: with them, a publisher that is destroyed while its
+        subscribers go may wait for ever in Fast DDS.
+        """
+        while not self._stopping.wait(MATCHING):
+            self.matched()
+
     def _asked(self) -> bool:
         """Return whether anybody subscribes to answers, or they are kept for those who will."""
         unasked = {self.resolve_topic_name(it) for it in NO_ANSWERS}
@@ -214,6 +228,7 @@ class DetectorNode(ProcessNode, LifecycleNodeMixin):
     def close(self) -> None:
         """Interrupt the current identification."""
         self._stopping.set()
+        self._matcher.join()
         ending.begin()
         self._worker.stop()
         self._queue.give_up(STOPPING)

@@ -17,7 +17,6 @@ from rcl_interfaces.msg import SetParametersResult
 from rcl_interfaces.srv import SetParametersAtomically
 from rclpy.callback_groups import CallbackGroup
 from rclpy.clock import Clock, ClockType
-from rclpy.event_handler import PublisherEventCallbacks
 from rclpy.exceptions import InvalidHandle, ParameterException
 from rclpy.executors import MultiThreadedExecutor
 from rclpy.logging import LoggingSeverity, get_logger_effective_level, set_logger_level
@@ -157,11 +156,7 @@ class ProcessNode(Node):
     def publisher(self, kind: type, topic: str, depth: int = 1) -> Publisher:
         """Return a publisher, reliable and of this depth unless `qos_overrides` differ."""
         profile = qos_profile(declare_qos(self, PUBLISHER, topic, depth))
-        events = PublisherEventCallbacks(matched=lambda _: self.matched())
-        return self.create_publisher(kind, topic, profile, event_callbacks=events)
-
-    def matched(self) -> None:
-        """Take note that somebody has begun or ceased to subscribe to what `publisher` made."""
+        return self.create_publisher(kind, topic, profile)
 
     def subscribe(
         self,
