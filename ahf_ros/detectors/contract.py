@@ -294,6 +294,13 @@ class DetectorSettings:
         smallest = min(_MINIMUM_RADII.get(kind, _MINIMUM_RADIUS) for kind in kinds)
         return self.min_radius or smallest, self.max_radius
 
+    def of_size(self, radii: np.ndarray) -> np.ndarray:
+        """Return which dots, of semi-major axes (k,) in px, are reported, bool, shape (k,).
+
+        The minimum of a kind is where dots are looked for; smaller ones that are read are read.
+        """
+        return (radii >= self.min_radius) & (radii <= self.max_radius)
+
     def narrowed(self, families: Iterable[str]) -> DetectorSettings:
         """Return the same settings for some of the families."""
         return replace(self, family=','.join(families))

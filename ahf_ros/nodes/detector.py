@@ -85,6 +85,7 @@ class DetectorNode(ProcessNode, LifecycleNodeMixin):
         self._active = False
         self._rested = (False, False)
         self._matching = threading.Lock()
+        self._no_answers = {self.resolve_topic_name(it) for it in NO_ANSWERS}
         self._stopping = threading.Event()
         self._worker = Worker()
         self._tally = Tally()
@@ -178,16 +179,16 @@ class DetectorNode(ProcessNode, LifecycleNodeMixin):
     def activate(self) -> None:
         """Subscribe to images, and answer those that wait."""
         self._active = True
-        self.matched()
+        self._listen_if_asked()
         self._worker.resume()
 
     def deactivate(self) -> None:
         """Stop to receive and to answer images; those that wait are kept."""
         self._active = False
-        self.matched()
+        self._listen_if_asked()
         self._worker.pause()
 
-    def matched(self) -> None:
+    def _listen_if_asked(self) -> None:
         """Receive images as long as the node is active and somebody asks for answers."""
         with self._matching:
             self.listen(self._active and self._asked())
@@ -199,16 +200,15 @@ class DetectorNode(ProcessNode, LifecycleNodeMixin):
         subscribers go may wait for ever in Fast DDS.
         """
         while not self._stopping.wait(MATCHING):
-            self.matched()
+            self._listen_if_asked()
 
     def _asked(self) -> bool:
         """Return whether anybody subscribes to answers, or they are kept for those who will."""
-        unasked = {self.resolve_topic_name(it) for it in NO_ANSWERS}
         kept = DurabilityPolicy.TRANSIENT_LOCAL
         for it in self.publishers:
             with suppress(InvalidHandle):  # it has been destroyed meanwhile
                 asked = it.get_subscription_count() or it.qos_profile.durability == kept
-                if asked and it.topic_name not in unasked:
+                if asked and it.topic_name not in self._no_answers:
                     return True
         return self._settings.on('always')
 
@@ -283,7 +283,6 @@ class DetectorNode(ProcessNode, LifecycleNodeMixin):
             # The callback may write to the disk and must not block the others.
             group = MutuallyExclusiveCallbackGroup()
             self._images = self.subscribe(kind, topic, put, group, lossless)
-        self.matched()
 
     def _service_detector(self, settings: DetectorNodeSettings) -> ServiceDetector | None:
         """Return the detector that calls a service, if the settings name it."""
@@ -327,7 +326,6 @@ class DetectorNode(ProcessNode, LifecycleNodeMixin):
         state = self.state
         self._tally.inactive = '' if state == ACTIVE else state
         if self._images and state == ACTIVE:
-            self.matched()
             settings = self._settings.current
             self._tally.unasked = not self._listening
             # Of what is not subscribed to, nothing is expected.

@@ -201,8 +201,7 @@ def report(rings: Rings, settings: DetectorSettings, code: DotFamily) -> list[Do
     ids = code.ids(rings.words)
     decoded = (rings.of_word >= CERTAIN) & (ids > 0)
     shown = decoded | (settings.report_undecoded & (rings.whole | (rings.of_target >= CERTAIN)))
-    of_size = (major >= settings.min_radius) & (major <= settings.max_radius)
-    which = np.flatnonzero(shown & of_size)
+    which = np.flatnonzero(shown & settings.of_size(major))
     targets = _targets(rings.select(which), np.where(decoded, ids, UNDECODED)[which], code)
     return best_targets(targets, code.border_radius)
 

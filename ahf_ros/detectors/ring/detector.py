@@ -332,8 +332,7 @@ def report(
     """
     major, _, _ = frame.ellipse_axes(hypotheses.frames)
     whole = settings.report_undecoded & (hypotheses.share >= WHOLE)
-    # The kind's own minimum is where dots are looked for; what is read of smaller ones is read.
-    of_size = (major >= settings.min_radius) & (major <= settings.max_radius)
+    of_size = settings.of_size(major)
     hypotheses = among_others(hypotheses.select(of_size))
     hypotheses = settle_same_prints(hypotheses, settings.codes(Family))
     whole = whole[of_size]

@@ -54,7 +54,6 @@ def predicted_light(
     """
     points, ground, candidates, order, compared = _geometry(band, circles)
     place = _places(band[1] + _MARGIN, angles, radii)
-    toward = _nearest(angles, points)
     shape = len(frames), len(angles), len(radii)
     light, spread = np.empty(shape, np.float32), np.empty(shape, np.float32)
     for start in range(0, len(frames), _PART):
@@ -63,9 +62,8 @@ def predicted_light(
         values = lifted(values, lift[part].astype(np.float32)[:, None, None])
         grounds, (seen, overlap, few) = ground[None], compared
         if plate is not None and contrast is not None and np.isfinite(plate[part]).any():
-            values, grounds = _as_dark(
-                values, ground, points, band, plate[part][..., toward], contrast[part]
-            )
+            ends = plate[part][..., _nearest(angles, points)]
+            values, grounds = _as_dark(values, ground, points, band, ends, contrast[part])
             seen, overlap, few = _compared(grounds, candidates)
         logs = np.log(values + np.float32(LOG_OFFSET))
         whole = grounds.sum(axis=(1, 2), keepdims=True)
