@@ -59,7 +59,7 @@ ACTIVE = 'active'
 NO_ANSWERS = '/diagnostics', '/parameter_events'
 """Topics that are published without images."""
 
-MATCHING = 0.1
+MATCHING = 0.25
 """Time within which a node notices who subscribes to answers, s."""
 
 IDLE = 3.0
