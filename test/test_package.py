@@ -18,6 +18,7 @@ from pathlib import Path
 import cv2
 import pytest
 
+from ahf_ros.nodes.start import NODES
 from support import ROOT
 from support.command_line import python
 
@@ -32,45 +33,9 @@ MODULES = {
 NOT_DISTRIBUTED = ('.ci/*', '.gitignore')
 ADDED_BY_SETUPTOOLS = ('MANIFEST.in', 'README.md', 'pyproject.toml', 'setup.py')
 
-ROSDEP = {
-    'argcomplete': 'python3-argcomplete',
-    'cv2': 'python3-opencv',
-    'hypothesis': 'python3-hypothesis',
-    'jinja2': 'python3-jinja2',
-    'PIL': 'python3-pil',
-    'matplotlib': 'python3-matplotlib',
-    'numpy': 'python3-numpy',
-    'pytest': 'python3-pytest',
-    'reportlab': 'python3-reportlab',
-    'rich': 'python3-rich',
-    'ruamel': 'python3-ruamel.yaml',
-    'scipy': 'python3-scipy',
-    'threadpoolctl': 'python3-sklearn',
-    'yaml': 'python3-yaml',
-}
-"""Keys of rosdep of what is not a ROS package; scikit-learn brings threadpoolctl, which has no
-key."""
+NOT_INSTALLED = {'Metashape', 'typing_extensions'}
+"""What is only in the console of other software, and what only type checkers import."""
 
-NOT_IN_ROSDEP = {
-    'av',
-    'pupil_apriltags',
-    'Metashape',
-    'distributed',
-    'fsspec',
-    'mcap',
-    'pandas',
-    'pillow_heif',
-    'pycolmap',
-    'pypdfium2',
-    'rosbags',
-    'selenium',
-    'typing_extensions',
-    'zstandard',
-}
-"""What tests skip without, extras, what only type checkers import, and what is only in the console
-of other software. Of rosbags and mcap, rosdep would take those of pip."""
-
-TO_RUN, TO_TEST = ('depend', 'exec_depend'), ('depend', 'exec_depend', 'test_depend')
 OWN = {'ahf_ros', 'benchmarks', 'support'}
 
 needs_rosbags = pytest.mark.skipif(
@@ -172,20 +137,26 @@ def test_tests_of_bags_skip_without_rosbags() -> None:
 
 
 @pytest.mark.parametrize(
-    ('folders', 'kinds'),
-    [(('ahf_ros', 'launch'), TO_RUN), (('test', 'support', 'benchmarks'), TO_TEST)],
+    ('folders', 'tests'),
+    [(('ahf_ros', 'launch'), False), (('test', 'support', 'benchmarks'), True)],
 )
-def test_package_xml_names_what_is_imported(
-    folders: tuple[str, ...], kinds: tuple[str, ...]
-) -> None:
-    root = ElementTree.parse(ROOT / 'package.xml').getroot()
-    declared = {item.text for kind in kinds for item in root.iter(kind)}
+def test_pyproject_names_what_is_imported(folders: tuple[str, ...], tests: bool) -> None:
+    tomllib = pytest.importorskip('tomllib', reason='Python is older than 3.11')
+    project = tomllib.loads((ROOT / 'pyproject.toml').read_text())
+    tables = project['tool']['ahf_ros']
+    extras = project['project']['optional-dependencies']
+    ours = {it: extras[it] for it in extras if tests or not it.startswith('test')}
+    lists = [project['project']['dependencies'], tables['packaging']['nodes'], *ours.values()]
+    packages = {re.split(r'[^\w.-]', it)[0] for each in lists for it in each}
+    declared = {tables['names'].get(it, {}).get('import', it.replace('-', '_')) for it in packages}
+    declared |= {*tables['ros']['messages'], *tables['ros']['run']}
+    declared |= set(tables['ros']['test'] if tests else ())
     files = [file for folder in folders for file in (ROOT / folder).rglob('*.py')]
     names = {name.split('.')[0] for file in files for name in imported(file)}
-    names -= OWN | NOT_IN_ROSDEP | sys.stdlib_module_names
+    names -= OWN | NOT_INSTALLED | sys.stdlib_module_names
     foreign = {it for it in names if not it.startswith('test_')}
     assert len(foreign) > 5
-    assert {ROSDEP.get(it, it) for it in foreign} - declared == set()
+    assert foreign - declared == set()
 
 
 def test_the_maintainer_is_not_of_a_host_that_may_be_somebodys() -> None:
@@ -209,9 +180,19 @@ def test_the_demo_installs_only_what_it_needs(tmp_path: Path) -> None:
 
 def test_ros2_run_finds_every_program() -> None:
     text = (ROOT / 'CMakeLists.txt').read_text()
-    (programs,) = re.findall(r'install\(PROGRAMS([^)]*)DESTINATION lib/\$\{PROJECT_NAME\}', text)
-    scripts = {file.name for file in (ROOT / 'scripts').iterdir() if file.is_file()}
-    assert set(programs.split()) == {f'scripts/{it}' for it in scripts if '.' not in it}
+    (programs,) = re.findall(r'foreach\(_program (.*)\)', text)
+    assert set(programs.split()) == {'ahf', 'demo', *NODES}
+
+
+@pytest.mark.parametrize(
+    ('name', 'said'), [('demo', 'ahf demo'), ('pose', 'ros2 run ahf_ros pose')]
+)
+def test_a_program_is_what_it_is_called(name: str, said: str, tmp_path: Path) -> None:
+    program = tmp_path / name
+    shutil.copy(ROOT / 'scripts' / 'program', program)
+    done = python(program, '--help')
+    assert done.returncode == 0, done.stderr
+    assert said in done.stdout.splitlines()[0]
 
 
 class ImportingPlugin:
