@@ -33,7 +33,8 @@ import numpy as np
 
 from ahf_ros.cloud_settings import FULL, NEIGHBOURHOOD, CloudGrid
 from ahf_ros.features.robust import NORMAL
-from ahf_ros.interchange.point_clouds import AXES, COVARIANCE, TARGET_POINT
+from ahf_ros.interchange.cloud_files import AXES
+from ahf_ros.interchange.point_clouds import COVARIANCE, TARGET_POINT
 from ahf_ros.target import Target
 
 MINIMUM_POINTS = 12

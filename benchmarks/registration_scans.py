@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ahf_ros.interchange.point_clouds import AXES
+from ahf_ros.interchange.cloud_files import AXES
 from ahf_ros.localisation import positions
 from ahf_ros.orientation.network import FloatArray
 from ahf_ros.orientation.transform import Transform

@@ -261,7 +261,7 @@ def _noted(
 ) -> tuple[dict[str, Exif], dict[str, tuple[int, int]]]:
     """Return Exif data and sizes of the photographs that are at hand."""
     from ahf_ros.interchange.exif import read_exif
-    from ahf_ros.report.images import find_image
+    from ahf_ros.interchange.image_files import find_image
 
     exif, sizes = {}, {}
     source = Path(options.observations)

@@ -20,9 +20,11 @@ from pathlib import Path
 
 import numpy as np
 
-from ahf_ros.interchange.point_clouds import AXES
 from ahf_ros.opening import LARGEST, Most, read_bytes, reader
 from ahf_ros.text import shown
+
+AXES = ('x', 'y', 'z')
+"""Fields that a cloud must have."""
 
 _LONGEST_HEADER = 2**16
 _PLY_TYPES = {

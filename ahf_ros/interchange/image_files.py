@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import struct
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
+from pathlib import Path, PurePath
 
 import cv2
 import numpy as np
@@ -15,6 +16,7 @@ from ahf_ros.imaging.headers import HEIC, UPRIGHT, read_header
 from ahf_ros.imaging.heic import ENDINGS, decoded_heic
 from ahf_ros.imaging.image import as_oriented, check_size, without_gaps
 from ahf_ros.imaging.whole import decoded
+from ahf_ros.inputs import register_input
 from ahf_ros.opening import Most, read_bytes, reader
 from ahf_ros.writing import write_whole
 
@@ -29,6 +31,36 @@ _ADVICE = f'{_ACCEPTED}: convert it in full size to 16-bit TIFF or PNG, without 
 def image_suffixes() -> tuple[str, ...]:
     """Return the endings of the files that are taken for images: of HEIC where that is read."""
     return SUFFIXES if missing('heic') else (*SUFFIXES, *ENDINGS)
+
+
+def find_image(image: str, source: Path, folders: Sequence[Path] = ()) -> Path:
+    """Return the path of an image, which may have moved since it was identified.
+
+    It may now be in `folders`, directly or in the folders that `image` names. A relative path may
+    start at the folder of `source`, the file with the result, or at the one around it. A
+    ValueError says so if the image is nowhere.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     Path(folder, 'b').mkdir()
+    ...     Path(folder, 'b', 'a.png').touch()
+    ...     find_image('/gone/b/a.png', Path('r.jsonl'), [Path(folder)]).parts[-2:]
+    ('b', 'a.png')
+    """
+    path = PurePath(image)
+    parts = path.parts[1:] if path.is_absolute() else path.parts
+    tails = [PurePath(*parts[start:]) for start in range(len(parts))]
+    places = [folder / tail for folder in folders for tail in tails]
+    beside = source.absolute().parent
+    places += [Path(path), beside / path, beside.parent / path]
+    for place in places:
+        if place.is_file():
+            register_input(place)
+            return place
+    where = f' or in {", ".join(map(str, folders))}' if folders else '; --images says where it is'
+    raise ValueError(f'{image} is not there{where}')
 
 
 @dataclass(frozen=True, slots=True, eq=False)

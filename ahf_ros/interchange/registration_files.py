@@ -9,9 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from ahf_ros.interchange.cloud_files import write_pcd, write_ply
+from ahf_ros.interchange.cloud_files import AXES, write_pcd, write_ply
 from ahf_ros.interchange.files import csv_table
-from ahf_ros.interchange.point_clouds import AXES
 from ahf_ros.orientation.network import FloatArray
 from ahf_ros.orientation.transform import Transform
 from ahf_ros.registration.field import Field, RegisteredScan

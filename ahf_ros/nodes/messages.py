@@ -32,7 +32,8 @@ from visualization_msgs.msg import ImageMarker, Marker, MarkerArray
 
 from ahf_ros.codes.square import library_name
 from ahf_ros.drawing.overlay import DECODED_COLOUR, DOUBTFUL_COLOUR, Colour
-from ahf_ros.interchange.point_clouds import AXES, COVARIANCE, NUMBERS
+from ahf_ros.interchange.cloud_files import AXES
+from ahf_ros.interchange.point_clouds import COVARIANCE, NUMBERS
 from ahf_ros.interchange.target_messages import has_corners
 from ahf_ros.localisation import Positions, labelled
 from ahf_ros.msg import CodedTarget, CodedTargetArray

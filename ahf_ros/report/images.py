@@ -9,7 +9,7 @@ import base64
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path, PurePath
+from pathlib import Path
 
 import cv2
 import numpy as np
@@ -17,8 +17,7 @@ import numpy as np
 from ahf_ros.filtering.homomorphic import FilterSettings, HomomorphicFilter
 from ahf_ros.imaging.image import stretched_to_8_bit
 from ahf_ros.imaging.stack import ImageStack, unlike
-from ahf_ros.inputs import register_input
-from ahf_ros.interchange.image_files import read_image
+from ahf_ros.interchange.image_files import find_image, read_image
 from ahf_ros.report.results import ImageResult
 
 _THUMBNAIL_SIDES = 132, 88  # maximum width and height, px
@@ -35,36 +34,6 @@ _MAXIMUM_STEP = 6.0  # from one size to the next, in pixels
 _MAXIMUM_WEBP = 2_000_000  # px; it takes 0.6 s per million
 _MAXIMUM_WEBP_SIDE = 16_383  # px, of the format
 _MINIMUM_SIDE = 16  # px, the longer side
-
-
-def find_image(image: str, source: Path, folders: Sequence[Path] = ()) -> Path:
-    """Return the path of an image, which may have moved since it was identified.
-
-    It may now be in `folders`, directly or in the folders that `image` names. A relative path may
-    start at the folder of `source`, the file with the result, or at the one around it. A
-    ValueError says so if the image is nowhere.
-
-    Examples
-    --------
-    >>> import tempfile
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     Path(folder, 'b').mkdir()
-    ...     Path(folder, 'b', 'a.png').touch()
-    ...     find_image('/gone/b/a.png', Path('r.jsonl'), [Path(folder)]).parts[-2:]
-    ('b', 'a.png')
-    """
-    path = PurePath(image)
-    parts = path.parts[1:] if path.is_absolute() else path.parts
-    tails = [PurePath(*parts[start:]) for start in range(len(parts))]
-    places = [folder / tail for folder in folders for tail in tails]
-    beside = source.absolute().parent
-    places += [Path(path), beside / path, beside.parent / path]
-    for place in places:
-        if place.is_file():
-            register_input(place)
-            return place
-    where = f' or in {", ".join(map(str, folders))}' if folders else '; --images says where it is'
-    raise ValueError(f'{image} is not there{where}')
 
 
 def shown_image(
