@@ -13,7 +13,8 @@ setup(
     package_data={
         '': ['*.json', 'py.typed'],
         'ahf_ros.codes': ['ring_families/*'],
-        'ahf_ros.report': ['page/*'],
+        'ahf_ros.interchange': ['html/*'],
+        'ahf_ros.report': ['network_html/*', 'page/*'],
     },
     # With this an editable installation is one path to the sources, new modules included.
     package_dir={'': '.'},

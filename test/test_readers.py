@@ -43,6 +43,7 @@ MAY_OPEN = {
     'interchange/exif.py': 'a file that is open already',
     'interchange/export/colmap.py': 'a database that was written before',
     'interchange/export/xml_files.py': 'a script of the package',
+    'interchange/html_pages.py': 'parts of pages',
     **dict.fromkeys(('bag/source.py', 'bag/mcap_records.py', 'bag/output.py'), 'bags'),
     'bag/definitions.py': 'definitions of the package',
     'batch/engine.py': 'what the system says of cores',
@@ -52,7 +53,6 @@ MAY_OPEN = {
     'features/logistic.py': 'weights of the package',
     'nodes/process.py': 'no files',
     'nodes/processes.py': 'what the system says of processes',
-    'report/page.py': 'parts of the page',
 }
 """Modules that may open something else than what a user names, and what."""
 

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from ahf_ros.interchange.html_pages import page_script, page_style, page_template, script_json
 from ahf_ros.orientation.camera import parameters_of
 from ahf_ros.orientation.points import correlations, standard_deviations
 from ahf_ros.orientation.solution import Solution
@@ -23,19 +25,19 @@ from ahf_ros.report.network_summary import (
     summary,
     unknown_rows,
 )
-from ahf_ros.report.page import page_script, page_style, page_template, script_json
 from ahf_ros.text import decimals
 
+_PAGE = Path(__file__).parent / 'network_html'
 _PICTURES = 60  # photographs whose residuals are drawn: those with the largest ones
 _CORRELATED = 0.7  # correlation of two parameters of a camera that is listed
 
 
 def network_page(solution: Solution, title: str) -> bytes:
     """Return the page of a network; raises a `MissingExtra` without jinja2."""
-    text = page_template('network.html').render(
+    text = page_template(_PAGE, 'network.html').render(
         title=title,
-        style=page_style('network.css'),
-        script=page_script(('network',)),
+        style=page_style(_PAGE, 'network.css'),
+        script=page_script(_PAGE, ('network',)),
         **_content(solution),
     )
     encoded: bytes = text.encode('utf-8', 'backslashreplace')

@@ -5,7 +5,6 @@ What it knows about each image is a row of numbers and texts, ready for JSON.
 
 from __future__ import annotations
 
-import json
 import math
 import os
 from collections import Counter
@@ -24,7 +23,7 @@ from ahf_ros.detectors.contract import DetectorSettings
 from ahf_ros.doubt import DOUBTFUL_BELOW, doubt
 from ahf_ros.edge_shift import edge_shift_remark
 from ahf_ros.evaluation import FALSE, RIGHT, WRONG, judge
-from ahf_ros.extras import need
+from ahf_ros.interchange.html_pages import page_script, page_style, page_template, script_json
 from ahf_ros.opening import parsing
 from ahf_ros.report.images import Picture, fitted, shown_image, thumbnail
 from ahf_ros.report.results import ImageResult
@@ -232,11 +231,11 @@ def write_page(
     """Write the page of results to a file that is never there in part.
 
     The settings may have another title. The truth is by the names of images without folders, which
-    may be in other `folders` now, see `ahf_ros.report.images.find_image`. `track` follows the
-    images as they are done. The texts that are returned say what is wrong with images. A
-    ValueError says so if the file cannot be written, or jinja2 is not installed.
+    may be in other `folders` now, see `find_image`. `track` follows the images as they are done.
+    The texts that are returned say what is wrong with images. A ValueError says so if the file
+    cannot be written, or jinja2 is not installed.
     """
-    template = page_template('page.html')
+    template = page_template(_PAGE, 'page.html')
     families = families_of(results)
     rows = []
     empty = [result for result in results if not result.identified][:LOOKED_AT]
@@ -250,8 +249,8 @@ def write_page(
         'doubtfulBelow': settings.doubtful_below,
         'maxSize': settings.max_size,
     }
-    style = page_style('style.css')
-    script = page_script(_SCRIPTS)
+    style = page_style(_PAGE, 'style.css')
+    script = page_script(_PAGE, _SCRIPTS)
     taken = sum(map(len, rows)) + len(style) + len(script)
     limits = _limits(round(1e6 * settings.max_size) - taken, results)
     problems: dict[int, str] = {}
@@ -284,31 +283,6 @@ def write_page(
     return [problems[index] for index in sorted(problems)]
 
 
-def page_style(name: str) -> str:
-    """Return the colours of all pages and the styles of one."""
-    return '\n'.join((_PAGE / it).read_text(encoding='utf-8') for it in ('colours.css', name))
-
-
-def page_script(names: Iterable[str]) -> str:
-    """Return scripts of a page, in their order."""
-    return '\n'.join((_PAGE / f'{it}.js').read_text(encoding='utf-8') for it in names)
-
-
-def page_template(name: str) -> Any:
-    """Return a template of jinja2, or raise a `MissingExtra`."""
-    need('report')
-    from jinja2 import Environment, FileSystemLoader, StrictUndefined
-
-    environment = Environment(
-        loader=FileSystemLoader(_PAGE),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    return environment.get_template(name)
-
-
 def _advice(result: ImageResult, folders: Sequence[Path]) -> list[str]:
     """Return what may help with an image in which nothing was identified."""
     # An image that is not there, or cannot be shown, is named with its picture.
@@ -339,9 +313,3 @@ def _pictures(result: ImageResult, limit: int, folders: Sequence[Path]) -> dict[
             pictures['original'] = fitted(original, part)
             pictures['filtered'] = fitted(filtered, limit - part)
         return pictures
-
-
-def script_json(value: Any) -> str:
-    """Return JSON that a script element can hold, whatever texts are in it."""
-    text = json.dumps(value, separators=(',', ':'), allow_nan=False)
-    return text.replace('<', '\\u003c')
