@@ -29,13 +29,8 @@ from ahf_ros.codes.ring import FAMILY_NAMES, Family, family, words_of_print
 from ahf_ros.codes.square import has_dictionary
 from ahf_ros.detectors import Contesting, create_detector
 from ahf_ros.detectors.contract import DetectorSettings
-from ahf_ros.detectors.ring.learning import (
-    DotsOfOctave,
-    LearntFamily,
-    bands_about,
-    dots_in,
-    learn_families,
-)
+from ahf_ros.detectors.ring.bands import DotsOfOctave, bands_about, dots_in
+from ahf_ros.detectors.ring.learning import LearntFamily, learn_families
 from ahf_ros.doubt import repeated_remark
 from ahf_ros.edge_shift import edge_shift_remark, median_edge_shift
 from ahf_ros.features.dot_search import whole_dots

@@ -19,7 +19,8 @@ import numpy as np
 from ahf_ros.codes.cyclic import smallest_rotation
 from ahf_ros.codes.ring import Family, conforming, ring_family
 from ahf_ros.detectors import DetectorSettings, create_detector
-from ahf_ros.detectors.ring.learning import LearntFamily, find_bands, learn_families
+from ahf_ros.detectors.ring.bands import find_bands
+from ahf_ros.detectors.ring.learning import LearntFamily, learn_families
 from ahf_ros.evaluation import Score, score, total
 from ahf_ros.synthetic.scene import Rendering, SceneSettings, render
 from benchmarks import report

@@ -24,7 +24,8 @@ if TYPE_CHECKING:
 
     from ahf_ros.codes.gsi import PointFamily
     from ahf_ros.codes.gsi_learning import Learnt
-    from ahf_ros.detectors.ring.learning import Bands, LearntFamily
+    from ahf_ros.detectors.ring.bands import Bands
+    from ahf_ros.detectors.ring.learning import LearntFamily
 
 _OF_DOTS = 'polarity', 'min_radius', 'max_radius'  # options
 _COLUMNS, _TILE = 6, 180  # of the contact sheet, and width of a picture, px
@@ -94,7 +95,8 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _learn_rings(options: argparse.Namespace) -> int:
-    from ahf_ros.detectors.ring.learning import MINIMUM_TARGETS, Bands, find_bands, learn_families
+    from ahf_ros.detectors.ring.bands import MINIMUM_TARGETS, Bands, find_bands
+    from ahf_ros.detectors.ring.learning import learn_families
     from ahf_ros.interchange.image_files import read_image
 
     paths, problems, left_out = image_paths(options.sources)

@@ -13,12 +13,8 @@ import pytest
 from ahf_ros.codes.cyclic import smallest_rotation
 from ahf_ros.codes.ring import conforming, family, ring_family
 from ahf_ros.detectors import DetectorSettings, create_detector
-from ahf_ros.detectors.ring.learning import (
-    LearntFamily,
-    find_bands,
-    learn_families,
-    likely_rules,
-)
+from ahf_ros.detectors.ring.bands import find_bands
+from ahf_ros.detectors.ring.learning import LearntFamily, learn_families, likely_rules
 from ahf_ros.interchange.image_files import read_image, write_image
 from ahf_ros.synthetic.scene import Rendering, SceneSettings
 from support.command_line import status

@@ -16,6 +16,7 @@ import numpy as np
 from ahf_ros.blas import one_blas_thread
 from ahf_ros.codes.ring import Family
 from ahf_ros.detectors.contract import DetectorSettings
+from ahf_ros.detectors.ring.bands import with_measured_bands
 from ahf_ros.detectors.ring.choice import choose_families, further_families
 from ahf_ros.detectors.ring.contests import among_others, resolve
 from ahf_ros.detectors.ring.families import (
@@ -27,7 +28,6 @@ from ahf_ros.detectors.ring.families import (
 from ahf_ros.detectors.ring.full_size import at_full_size
 from ahf_ros.detectors.ring.hypotheses import Hypotheses
 from ahf_ros.detectors.ring.known import WHOLE, Explained, Prior
-from ahf_ros.detectors.ring.learning import with_measured_bands
 from ahf_ros.detectors.ring.proposals import (
     PROPOSALS,
     Proposal,

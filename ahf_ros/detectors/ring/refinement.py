@@ -12,11 +12,11 @@ from dataclasses import replace
 import numpy as np
 
 from ahf_ros.codes.ring import Family, canonical
+from ahf_ros.detectors.ring.bands import with_measured_bands
 from ahf_ros.detectors.ring.circles import RAYS, REACH
 from ahf_ros.detectors.ring.full_size import with_soft_edges
 from ahf_ros.detectors.ring.hypotheses import Hypotheses
 from ahf_ros.detectors.ring.known import Prior
-from ahf_ros.detectors.ring.learning import with_measured_bands
 from ahf_ros.detectors.ring.reading import read_bands
 from ahf_ros.features import frame
 from ahf_ros.features.circle_fit import ENOUGH, Fit, fit_dots
