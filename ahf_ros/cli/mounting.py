@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from ahf_ros.cli.options import add_option, input_name, parsed_by
 from ahf_ros.settings.parameter import Parameter
 
 if TYPE_CHECKING:
+    from ahf_ros.interchange.network_inputs import NetworkInputs
     from ahf_ros.orientation.mounting import Mounted
     from ahf_ros.orientation.solution import Solution
     from ahf_ros.orientation.transform import Transform
@@ -76,22 +78,26 @@ def check_mounting(options: argparse.Namespace) -> None:
                 raise ValueError(f'{name} is given without robot_poses, which it describes')
 
 
-def mounting_record(solution: Solution, options: argparse.Namespace) -> dict[str, Any]:
+def mounting_record(
+    solution: Solution, inputs: NetworkInputs, options: argparse.Namespace
+) -> dict[str, Any]:
     """Return where cameras are on a robot or a rig, nothing if that is not asked for."""
     if options.robot_poses:
-        return _on_robot(solution, options)
-    return _on_rig(solution, options) if options.stations else {}
+        return _on_robot(solution, inputs.robot_poses, options)
+    return _on_rig(solution, inputs.stations) if options.stations else {}
 
 
-def _on_robot(solution: Solution, options: argparse.Namespace) -> dict[str, Any]:
+def _on_robot(
+    solution: Solution, poses: Mapping[str, Transform], options: argparse.Namespace
+) -> dict[str, Any]:
     import numpy as np
 
-    from ahf_ros.interchange.robot_files import frame_name, read_robot_poses
+    from ahf_ros.interchange.robot_files import frame_name
     from ahf_ros.orientation.stations import mounted_on_robot
 
     result, notes = mounted_on_robot(
         solution,
-        read_robot_poses(options.robot_poses),
+        poses,
         position_sigma=options.robot_position_sigma * 1e-3,
         rotation_sigma=float(np.radians(options.robot_rotation_sigma)),
         unit=options.robot_unit,
@@ -104,17 +110,17 @@ def _on_robot(solution: Solution, options: argparse.Namespace) -> dict[str, Any]
 
     parts = [
         (parent, name(camera), pose)
-        for parent, poses in ((hand, result.mounts), (base, result.fields))
-        for camera, pose in poses.items()
+        for parent, places in ((hand, result.mounts), (base, result.fields))
+        for camera, pose in places.items()
     ]
     return _record(result, parts, notes)
 
 
-def _on_rig(solution: Solution, options: argparse.Namespace) -> dict[str, Any]:
-    from ahf_ros.interchange.robot_files import frame_name, read_stations
+def _on_rig(solution: Solution, stations: Mapping[str, str]) -> dict[str, Any]:
+    from ahf_ros.interchange.robot_files import frame_name
     from ahf_ros.orientation.stations import mounted_on_rig
 
-    reference, result, notes = mounted_on_rig(solution, read_stations(options.stations))
+    reference, result, notes = mounted_on_rig(solution, stations)
     parts = [
         (frame_name(reference) + _OPTICAL, frame_name(camera) + _OPTICAL, pose)
         for camera, pose in result.mounts.items()

@@ -38,9 +38,7 @@ from ahf_ros.text import printable
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from ahf_ros.interchange.exif import Exif
-    from ahf_ros.interchange.network_files import CameraKnowledge
-    from ahf_ros.interchange.observation_files import ObservedPhotograph
+    from ahf_ros.interchange.network_inputs import NetworkFiles, NetworkInputs
     from ahf_ros.orientation.network import Network
     from ahf_ros.orientation.progress import Watcher
     from ahf_ros.orientation.solution import Solution
@@ -199,91 +197,49 @@ def _datum(text: str) -> tuple[str, tuple[str, ...]]:
 def run(options: argparse.Namespace) -> int:
     """Orient the photographs, and write each group of them that hangs together."""
     need('orient')
+    from ahf_ros.interchange.network_inputs import read_network_inputs
     from ahf_ros.orientation.verdict import contradicted
 
     try:
         check_mounting(options)
-        network, notes = _network(options)
+        inputs = read_network_inputs(_files(options))
         with shown_progress(options.progress, options.quiet) as watcher:
-            solutions = _oriented(network, options, watcher)
+            solutions = _oriented(inputs.network, options, watcher)
         if not solutions:
             raise ValueError('no photograph could be oriented')
     except ValueError as error:
         tell('orient', error)
         return 1
     solutions = [
-        replace(it, warnings=(*notes, *_of_groups(solutions, number), *it.warnings))
+        replace(it, warnings=(*inputs.notes, *_of_groups(solutions, number), *it.warnings))
         for number, it in enumerate(solutions)
     ]
-    written = [_write(it, number, options) for number, it in enumerate(solutions)]
+    written = [_write(it, number, inputs, options) for number, it in enumerate(solutions)]
     if not all(written):
         return 1
     return CONTRADICTED if any(map(contradicted, solutions)) else 0
 
 
-def _network(options: argparse.Namespace) -> tuple[Network, list[str]]:
-    """Return the network that the options describe, and notes for the user."""
-    from ahf_ros.interchange.control_files import read_control, read_scale_bars
-    from ahf_ros.interchange.network_files import make_network
-    from ahf_ros.interchange.observation_files import read_observations
+def _files(options: argparse.Namespace) -> NetworkFiles:
+    from ahf_ros.interchange.network_inputs import NetworkFiles
 
-    photographs = read_observations(options.observations, options.origin)
-    return make_network(
-        photographs,
-        _cameras(photographs, options),
-        read_scale_bars(options.scale_bars) if options.scale_bars else (),
-        read_control(options.control, options.control_sigma) if options.control else (),
-        unit=options.unit,
+    return NetworkFiles(
+        observations=options.observations,
+        images=options.images,
+        cameras=options.cameras or '',
+        calibrations=options.calibration,
+        scale_bars=options.scale_bars or '',
+        control=options.control or '',
+        robot_poses=options.robot_poses or '',
+        stations=options.stations or '',
+        origin=options.origin,
         sigma=options.sigma,
-    )
-
-
-def _cameras(
-    photographs: Sequence[ObservedPhotograph], options: argparse.Namespace
-) -> CameraKnowledge:
-    from ahf_ros.interchange.camera_files import read_camera
-    from ahf_ros.interchange.network_files import CameraKnowledge, read_cameras
-
-    exif, sizes = _noted(photographs, options)
-    return CameraKnowledge(
-        names=read_cameras(options.cameras) if options.cameras else {},
-        exif=exif,
-        sizes=sizes,
-        calibrations=[read_camera(path) for path in options.calibration],
+        control_sigma=options.control_sigma,
+        unit=options.unit,
+        focal_length=options.focal_length,
         adjusted=options.adjust_calibration,
-        focal_length=_in_px(options.focal_length),
         equidistant=options.fisheye,
     )
-
-
-def _noted(
-    photographs: Sequence[ObservedPhotograph], options: argparse.Namespace
-) -> tuple[dict[str, Exif], dict[str, tuple[int, int]]]:
-    """Return Exif data and sizes of the photographs that are at hand."""
-    from ahf_ros.interchange.exif import read_exif
-    from ahf_ros.interchange.image_files import find_image
-
-    exif, sizes = {}, {}
-    source = Path(options.observations)
-    for photograph in photographs:
-        with suppress(ValueError):  # what is not there, or no image, says nothing
-            path = find_image(photograph.path, source, options.images)
-            found, size = read_exif(path)
-            exif[photograph.path] = found
-            if all(size):
-                sizes[photograph.path] = size
-    return exif, sizes
-
-
-def _in_px(length: tuple[float, str] | None) -> Callable[[int, int], float] | None:
-    if length is None:
-        return None
-    from ahf_ros.interchange.exif import equivalent_in_px
-
-    number, unit = length
-    if unit == 'px':
-        return lambda width, height: number
-    return lambda width, height: equivalent_in_px(number, width, height)
 
 
 @contextmanager
@@ -333,7 +289,9 @@ def _of_groups(solutions: Sequence[Solution], number: int) -> tuple[str, ...]:
     return tuple(it for it in notes if it)
 
 
-def _write(solution: Solution, number: int, options: argparse.Namespace) -> bool:
+def _write(
+    solution: Solution, number: int, inputs: NetworkInputs, options: argparse.Namespace
+) -> bool:
     """Write a network and its exports, print what was found, and return whether all is written."""
     from ahf_ros.interchange.export.formats import network_remark, write_network_export
     from ahf_ros.interchange.network_results import write_network
@@ -352,7 +310,7 @@ def _write(solution: Solution, number: int, options: argparse.Namespace) -> bool
         beside[REPORT_FILE] = network_page(solution, Path(options.observations).name)
 
     def mount() -> None:
-        if record := mounting_record(solution, options):
+        if record := mounting_record(solution, inputs, options):
             mounted.append(record)
             beside.update(mounting_files(record))
 
@@ -388,24 +346,11 @@ def print_network(solution: Solution, folder: str, console: Console | None = Non
     from ahf_ros.report import network_summary
 
     console = console or terminal()
-    unit, judged = solution.network.unit, verdict(solution)
+    judged = verdict(solution)
     colour = {'good': 'green', 'weak': 'yellow', 'bad': 'red'}[judged.grade]
     console.print(f'[bold {colour}]{escape(printable(judged.line, 2000))}[/]', highlight=False)
-    print_table(folder, ('', ''), network_summary.summary(solution), console)
-    for index in solution.calibrated.nonzero()[0].tolist():
-        rows = network_summary.camera_rows(solution, index)
-        title = f'Camera {solution.network.cameras[index].name}'
-        of_camera = 'parameter', 'value', 'standard deviation', 'ratio'
-        print_table(title, of_camera, rows, console)
-    if bars := network_summary.bar_rows(solution):
-        head = '', 'role', f'length, {unit}', 'deviation', 'sigma', 'ratio'
-        print_table('Scale bars', head, bars, console)
-    if control := network_summary.control_rows(solution):
-        head = '', 'role', f'dx, {unit}', 'dy', 'dz', 'sigma x, y, z'
-        print_table('Control points', head, control, console)
-    if rejected := network_summary.rejected_rows(solution):
-        head = 'photograph', 'target', 'x, px', 'y, px', 'residual, sigma', 'why'
-        print_table(f'{len(rejected)} left out', head, rejected, console)
+    for table in network_summary.tables(solution, folder):
+        print_table(*table, console)
     for mark, texts in (('yellow]!', solution.warnings), ('cyan]>', judged.to_do)):
         for text in texts:
             console.print(f'[{mark}[/] {escape(printable(text, len(text)))}', highlight=False)

@@ -21,6 +21,30 @@ Rows = Sequence[tuple[str, ...]]
 _IN_PX = ('f', 'cx', 'cy')
 
 
+def tables(solution: Solution, title: str) -> list[tuple[str, tuple[str, ...], Rows]]:
+    """Return the title, the head and the rows of each table that describes a network.
+
+    The first one, of the whole network, has the title that is given; tables without rows are left
+    out.
+    """
+    unit = solution.network.unit
+    found: list[tuple[str, tuple[str, ...], Rows]] = [(title, ('', ''), summary(solution))]
+    camera_head = 'parameter', 'value', 'standard deviation', 'ratio'
+    for index in solution.calibrated.nonzero()[0].tolist():
+        name = solution.network.cameras[index].name
+        found.append((f'Camera {name}', camera_head, camera_rows(solution, index)))
+    if bars := bar_rows(solution):
+        bar_head = '', 'role', f'length, {unit}', 'deviation', 'sigma', 'ratio'
+        found.append(('Scale bars', bar_head, bars))
+    if control := control_rows(solution):
+        control_head = '', 'role', f'dx, {unit}', 'dy', 'dz', 'sigma x, y, z'
+        found.append(('Control points', control_head, control))
+    if rejected := rejected_rows(solution):
+        rejected_head = 'photograph', 'target', 'x, px', 'y, px', 'residual, sigma', 'why'
+        found.append((f'{len(rejected)} left out', rejected_head, rejected))
+    return found
+
+
 def summary(solution: Solution) -> Rows:
     """Return names and values of what describes a whole network."""
     known, posed, used = solution.determined, solution.oriented, solution.start.used

@@ -284,6 +284,17 @@ def test_wrong_poses_of_a_robot_are_refused(tmp_path: Path, content: str, messag
         read_robot_poses(tmp_path / 'robot.csv')
 
 
+def test_all_tables_are_read_before_anything_is_computed(
+    results: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / 'table.csv').write_text('image,x\na.jpg,1\n')
+    for option in ('robot-poses', 'stations'):
+        given = f'--{option}', tmp_path / 'table.csv'
+        assert status('orient', results, '-o', tmp_path / 'network', *given) == 1
+        assert 'table.csv' in capsys.readouterr().err
+    assert not (tmp_path / 'network').exists()
+
+
 def test_progress_is_lines_where_it_is_asked_for_and_no_terminal(
     results: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

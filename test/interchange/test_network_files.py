@@ -15,8 +15,9 @@ import pytest
 
 from ahf_ros.interchange.camera_files import opencv_yaml, read_camera, ros_yaml
 from ahf_ros.interchange.control_files import read_control, read_scale_bars
-from ahf_ros.interchange.exif import Exif, read_exif
+from ahf_ros.interchange.exif import FILM_DIAGONAL, Exif, read_exif
 from ahf_ros.interchange.network_files import CameraKnowledge, make_network, read_cameras
+from ahf_ros.interchange.network_inputs import NetworkFiles, read_network_inputs
 from ahf_ros.interchange.observation_files import ObservedPhotograph, read_observations
 from ahf_ros.interchange.target_json import to_json
 from ahf_ros.orientation.camera import project
@@ -494,3 +495,31 @@ def test_bad_control_is_refused(tmp_path: Path, lines: list[str], message: str) 
 def test_bad_bars_are_refused(tmp_path: Path, row: str, message: str) -> None:
     with pytest.raises(ValueError, match=message):
         read_scale_bars(table(tmp_path, 'id_1,id_2,length,sigma', row))
+
+
+def test_all_files_of_a_network_are_read_in_one_place(results: Path) -> None:
+    saved(results, record('a.png', target(12), target(3, 30.5)), record('b.png', target(3)))
+    folder = results.parent
+    saved(folder / 'cameras.csv', 'image,camera', 'a.png,left', 'b.png,right')
+    saved(folder / 'bars.csv', 'id_1,id_2,length,sigma', '3,12,250,0.1')
+    saved(folder / 'stations.csv', 'image,station', 'a.png,1', 'b.png,1')
+    saved(folder / 'robot.csv', 'image,x,y,z,rx,ry,rz', 'a.png,1,2,3,0,0,0')
+    inputs = read_network_inputs(
+        NetworkFiles(
+            observations=str(results),
+            cameras=str(folder / 'cameras.csv'),
+            scale_bars=str(folder / 'bars.csv'),
+            robot_poses=str(folder / 'robot.csv'),
+            stations=str(folder / 'stations.csv'),
+            unit='m',
+            focal_length=(35.0, 'mm'),
+        )
+    )
+    network = inputs.network
+    assert [it.name for it in network.cameras] == ['left', 'right']
+    assert network.cameras[0].focal_length == pytest.approx(35.0 * 2000 / FILM_DIAGONAL)
+    assert (network.bars[0].length, network.unit, inputs.notes) == (250, 'm', [])
+    assert inputs.stations == {'a.png': '1', 'b.png': '1'}
+    np.testing.assert_array_equal(inputs.robot_poses['a.png'].translation, [1, 2, 3])
+    plain = read_network_inputs(NetworkFiles(str(results)))
+    assert (plain.network.bars, plain.robot_poses, plain.stations) == ((), {}, {})
