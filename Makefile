@@ -126,11 +126,13 @@ test-colcon:
 clean:
 	rm -rf .venv* build .coverage*
 
-# The modules are used where they are.
+# The modules are used where they are. The pip that comes with Python 3.11 takes twice as long as
+# today's to choose versions.
 $(INSTALLED): pyproject.toml setup.py package.xml
 	@$(PYTHON) scripts/prerequisites.py
 	@echo 'Setting up $(VENV): numpy, OpenCV and what else the command line needs.'
 	$(PYTHON) -m venv $(VENV)
+	$(PIP) --upgrade pip
 	$(BIN)/python -m pip install --disable-pip-version-check --editable .
 	touch $@
 
@@ -149,5 +151,6 @@ $(READY): $(NODES)
 
 $(OLDEST)/ready: test/oldest.txt
 	$(OLDEST_PYTHON) -m venv $(OLDEST)
+	$(OLDEST)/bin/python -m pip install $(QUIET) --upgrade pip
 	$(OLDEST)/bin/python -m pip install $(QUIET) --requirement $<
 	touch $@

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 
 import cv2
 import numpy as np
@@ -12,43 +13,45 @@ from ahf_ros.codes import CCTAG_NAMES
 from ahf_ros.detectors import create_detector
 from ahf_ros.detectors.cctag.light import EDGES, Lights
 from ahf_ros.synthetic.scene import Rendering
+from ahf_ros.target import Target
 from benchmarks.textures import lookalikes, textured_image
 from support.scenes import counted, errors, rendering
 
-SIZE = {'width': 560, 'height': 420, 'targets': 6, 'dot_radius': 14.0, 'seed': 2}
+SIZE = {'width': 560, 'height': 420, 'targets': 4, 'dot_radius': 14.0, 'seed': 2}
 
 
 def scene(family: str = 'cctag3', **changes: object) -> Rendering:
     return rendering(**SIZE | {'family': family} | changes)
 
 
-LIGHTS = [
+@cache
+def identified(family: str = 'cctag3', **changes: object) -> list[Target]:
+    return create_detector(family=family)(scene(family, **changes).image)
+
+
+STRIPES = {'light': 'stripe', 'ambient': 0.3}
+USUAL = [
     ('cctag3', {}, 0.02),
-    (
-        'cctag3',
-        {'light': 'stripe', 'ambient': 0.3, 'dot_radius': 20.0, 'targets': 4, 'seed': 3},
-        0.008,
-    ),
+    ('cctag3', {**STRIPES, 'dot_radius': 20.0, 'targets': 3, 'seed': 3}, 0.008),
+    ('cctag3', {'edge_shift': 0.5, 'dot_radius': 12.0}, 0.03),  # much of a ring
 ]
 SHAPES = [
     ('cctag4', {}, 0.02),
     ('cctag3', {'polarity': 'bright'}, 0.02),
     ('cctag3', {'dot_radius': 10.0}, 0.03),
     ('cctag3', {'dot_radius': 60.0, 'targets': 2}, 0.02),
-    ('cctag3', {'tilt': 40.0, 'dot_radius': 20.0, 'targets': 4}, 0.03),
+    ('cctag3', {'tilt': 40.0, 'dot_radius': 20.0, 'targets': 3}, 0.03),
     ('cctag3', {'blur': 2.0, 'dot_radius': 30.0, 'targets': 3}, 0.03),
-    ('cctag3', {'edge_shift': 0.5}, 0.03),
-    ('cctag3', {'edge_shift': -0.5, 'dot_radius': 24.0, 'targets': 4}, 0.03),
+    ('cctag3', {'edge_shift': -0.5, 'dot_radius': 24.0, 'targets': 3}, 0.03),
 ]
 
 
 @pytest.mark.parametrize(
     ('family', 'changes', 'limit'),
-    [*LIGHTS, *(pytest.param(*it, marks=pytest.mark.lasting) for it in SHAPES)],
+    [*USUAL, *(pytest.param(*it, marks=pytest.mark.lasting) for it in SHAPES)],
 )
 def test_targets_are_identified_where_they_are(family: str, changes: dict, limit: float) -> None:
-    shown = scene(family, **changes)
-    found = create_detector(family=family)(shown.image)
+    shown, found = scene(family, **changes), identified(family, **changes)
     count = len(shown.targets)
     assert counted(shown, found) == (count, 0, 0)
     assert np.sqrt((errors(shown, found) ** 2).mean()) < limit
@@ -67,11 +70,9 @@ def test_targets_are_read_out_of_focus() -> None:
 @pytest.mark.lasting
 @pytest.mark.parametrize('family', CCTAG_NAMES)
 def test_small_targets_are_found_in_stripes(family: str) -> None:
-    shown = scene(family, light='stripe', ambient=0.3, dot_radius=12.0, targets=10)
-    found = create_detector(family=family)(shown.image)
-    right, wrong, false = counted(shown, found)
-    assert right >= 9
-    assert (wrong, false) == (0, 0)
+    small = {**STRIPES, 'dot_radius': 12.0, 'targets': 6}
+    shown, found = scene(family, **small), identified(family, **small)
+    assert counted(shown, found) == (6, 0, 0)
     assert np.abs(errors(shown, found)).max() < 0.3
 
 
@@ -98,14 +99,9 @@ def test_rings_in_rings_are_none(seed: int) -> None:
     assert create_detector(family='cctag3,cctag4')(lookalikes(seed)) == []
 
 
-def test_targets_are_read_where_ink_has_grown_by_much_of_a_ring() -> None:
-    shown = scene(edge_shift=0.5, dot_radius=12.0)
-    assert counted(shown, create_detector(family='cctag3')(shown.image)) == (6, 0, 0)
-
-
 @pytest.mark.lasting
 def test_both_families_are_read_in_one_search() -> None:
-    three, four = (scene(family, width=360, height=280, targets=3) for family in CCTAG_NAMES)
+    three, four = (scene(family, width=360, height=280, targets=2) for family in CCTAG_NAMES)
     both = np.hstack([three.image, four.image])
     detector = create_detector(family='cctag3,cctag4')
     assert detector.name == 'cctag'
@@ -125,16 +121,15 @@ def test_both_families_are_read_in_one_search() -> None:
 @pytest.mark.lasting
 def test_refinement_finds_the_place_again() -> None:
     shown = scene()
-    detector = create_detector(family='cctag3')
-    found = detector(shown.image)
-    moved = [replace(target, x=target.x + 0.5, y=target.y - 0.4) for target in found]
-    refined = detector.refine(shown.image, moved)
+    moved = [replace(target, x=target.x + 0.5, y=target.y - 0.4) for target in identified()]
+    refined = create_detector(family='cctag3').refine(shown.image, moved)
+    assert len(refined) == 4
     assert np.abs(errors(shown, refined)).max() < 0.05
 
 
 @pytest.mark.lasting
 def test_letters_that_are_read_as_one_id_in_many_places_are_texture() -> None:
-    letters = textured_image(501)[340:400]
+    letters = textured_image(501)[340:400, :320]
     assert create_detector(family='cctag4')(letters) == []
 
 

@@ -55,11 +55,9 @@ def test_pixels_place_rings_better_than_rays() -> None:
 @pytest.mark.lasting
 @pytest.mark.parametrize('light', ['stripe', 'lattice'])
 def test_small_targets_are_read_and_placed_under_patterns(light: str) -> None:
-    shown = scene(width=800, height=600, targets=20, light=light, ambient=0.3)
+    shown = scene(width=560, height=420, targets=10, light=light, ambient=0.3)
     found = create_detector(family=FAMILY)(shown.image)
-    right, wrong, false = counted(shown, found)
-    assert right >= 18
-    assert (wrong, false) == (0, 0)
+    assert counted(shown, found) == (10, 0, 0)
     assert np.sqrt((errors(shown, found) ** 2).mean()) < 0.02
     assert 0.2 < relative_errors(shown, found).mean() / 2 < 2
 
@@ -112,17 +110,17 @@ def test_few_targets_and_none_stay_as_they_are_read() -> None:
 @pytest.mark.parametrize('gain', [0.15, 1.0])
 @pytest.mark.parametrize('amount', [0.0, 0.7])
 def test_dark_and_sharpened_images_are_explained(gain: float, amount: float) -> None:
-    shown = scene(dot_radius=12.0, targets=8)
+    shown = scene(dot_radius=12.0, targets=5)
     values = as_float(shown)
     values += amount * (values - cv2.GaussianBlur(values, (0, 0), 1.5))
     image = np.clip(gain * values, 0, 255).round().astype(np.uint8)
     found = create_detector(family=FAMILY)(image)
-    assert counted(shown, found) == (8, 0, 0)
+    assert counted(shown, found) == (5, 0, 0)
     assert np.sqrt((errors(shown, found) ** 2).mean()) < (0.02 if gain == 1.0 else 0.03)
 
 
 @pytest.mark.lasting
-@pytest.mark.parametrize('radius', [15.0, 30.0, 60.0])
+@pytest.mark.parametrize('radius', [15.0, 60.0])
 def test_drawings_are_read(radius: float) -> None:
     ids, fine = [0, 42, 85, 127], 8
     family = circle_family(FAMILY)
