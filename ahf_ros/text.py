@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 
 MAXIMUM_LENGTH = 300
 """Number of characters of a foreign text that are passed on."""
-
-_HELD = 1e-6  # of the largest standard deviation: of what a datum holds, and rounding
 
 
 def printable(text: str, longest: int = MAXIMUM_LENGTH) -> str:
@@ -68,16 +65,3 @@ def listed(names: Sequence[str], most: int = 8) -> str:
     """
     more = f' and {len(names) - most} more' if len(names) > most else ''
     return ', '.join(names[:most]) + more
-
-
-def decimals(sigmas: Iterable[float]) -> int:
-    """Return how many decimals show the smallest standard deviation with two digits.
-
-    Examples
-    --------
-    >>> decimals([0.12, 3.4]), decimals([200.0])
-    (2, 0)
-    """
-    every = list(sigmas)
-    above = [it for it in every if it > _HELD * max(every)]
-    return min(max(1 - math.floor(math.log10(min(above))), 0), 12) if above else 6

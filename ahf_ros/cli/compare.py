@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 from ahf_ros.cli import say, tell
 from ahf_ros.cli.options import add_option, add_quiet, input_path, output_path, parsed_by
 from ahf_ros.cli.tables import identifiers, print_table
+from ahf_ros.orientation.units import decimals
 from ahf_ros.settings.parameter import Parameter
-from ahf_ros.text import decimals
 
 if TYPE_CHECKING:
     from ahf_ros.orientation.congruence import Comparison

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from ahf_ros.cli import say, tell
 from ahf_ros.cli.options import add_quiet, input_name, input_path, output_path, parsed_by
 from ahf_ros.cli.tables import identifiers, print_table
-from ahf_ros.text import decimals
+from ahf_ros.orientation.units import decimals
 
 if TYPE_CHECKING:
     from ahf_ros.orientation.alignment import Alignment

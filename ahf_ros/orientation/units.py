@@ -1,4 +1,9 @@
-"""Units of length that coordinates may have."""
+"""Units of length that coordinates may have, and how many decimals are shown of them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
 
 METRES = {
     'm': 1.0,
@@ -13,6 +18,7 @@ METRES = {
 """Their names, and how many metres they are."""
 
 _SMALLEST, _LARGEST = 0.01, 2000.0  # m, of objects that are photographed for coordinates
+_HELD = 1e-6  # of the largest standard deviation: of what a datum holds, and rounding
 _ALIKE = 1.2  # ratio of two sizes of one object
 
 
@@ -47,3 +53,16 @@ def other_unit(given: float, measured: float, unit: str) -> str:
 
 def _alike(one: float, other: float) -> bool:
     return 1 / _ALIKE < one / other < _ALIKE
+
+
+def decimals(sigmas: Iterable[float]) -> int:
+    """Return how many decimals show the smallest standard deviation with two digits.
+
+    Examples
+    --------
+    >>> decimals([0.12, 3.4]), decimals([200.0])
+    (2, 0)
+    """
+    every = list(sigmas)
+    above = [it for it in every if it > _HELD * max(every)]
+    return min(max(1 - math.floor(math.log10(min(above))), 0), 12) if above else 6

@@ -12,6 +12,7 @@ from ahf_ros.orientation.camera import parameters_of
 from ahf_ros.orientation.points import correlations, standard_deviations
 from ahf_ros.orientation.solution import Solution
 from ahf_ros.orientation.strength import FEW_RAYS, SMALL_ANGLE, rays_of, semi_axes
+from ahf_ros.orientation.units import decimals
 from ahf_ros.orientation.verdict import verdict
 from ahf_ros.orientation.views import largest_angles
 from ahf_ros.report.network_figures import enlargement, image_figure, sensor_map, views
@@ -25,7 +26,6 @@ from ahf_ros.report.network_summary import (
     summary,
     unknown_rows,
 )
-from ahf_ros.text import decimals
 
 _PAGE = Path(__file__).parent / 'network_html'
 _PICTURES = 60  # photographs whose residuals are drawn: those with the largest ones

@@ -12,9 +12,10 @@ from ahf_ros.orientation.deviations import bar_deviations, control_deviations
 from ahf_ros.orientation.points import standard_deviations
 from ahf_ros.orientation.solution import Solution
 from ahf_ros.orientation.strength import rays_of, semi_axes
+from ahf_ros.orientation.units import decimals
 from ahf_ros.orientation.verdict import undetermined_parameters
 from ahf_ros.orientation.views import largest_angles
-from ahf_ros.text import counted, decimals
+from ahf_ros.text import counted
 
 Rows = Sequence[tuple[str, ...]]
 

@@ -20,7 +20,7 @@ from ahf_ros.orientation.network import FloatArray
 from ahf_ros.orientation.points import MeasuredPoints, blocks, standard_deviations
 from ahf_ros.orientation.solution import Solution
 from ahf_ros.orientation.strength import rays_of
-from ahf_ros.text import decimals
+from ahf_ros.orientation.units import decimals
 
 _LAYER, _LABELS = 'TARGETS', 'TARGET_NAMES'
 _TEXT = 0.008  # of the extent of the targets: height of their names
