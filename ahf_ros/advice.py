@@ -23,9 +23,9 @@ from statistics import median
 import cv2
 import numpy as np
 
-from ahf_ros.codes import RING_NAMES, SQUARE_NAMES
-from ahf_ros.codes.families import AUTO, families_of
-from ahf_ros.codes.ring import FAMILY_NAMES, Family, family, words_of_print
+from ahf_ros.codes import SQUARE_NAMES
+from ahf_ros.codes.families import AUTO, prints_of
+from ahf_ros.codes.ring import FAMILY_NAMES, Family, words_of_print
 from ahf_ros.codes.square import has_dictionary
 from ahf_ros.detectors import Contesting, create_detector
 from ahf_ros.detectors.contract import DetectorSettings
@@ -250,12 +250,14 @@ def _largest_told(settings: DetectorSettings) -> float:
 
 def _of_shared_prints(image: np.ndarray, settings: DetectorSettings) -> Iterator[str]:
     """Yield what targets are that several of the families have, too few to tell which it is."""
-    codes = tuple(family(name) for name in settings.families if name in RING_NAMES)
-    widest = [code.name for code in codes if code.has_all_words]
+    rings = [of.design for of in settings.prints.values() if of.kind == 'ring']
+    codes = {code.name: code for code in rings if isinstance(code, Family)}
+    widest = [code.name for code in codes.values() if code.has_all_words]
     if not 0 < len(widest) < len(codes):
         return
     found = _likely(_identified(image, settings.narrowed(widest)))
-    shown = Counter(tuple(words_of_print(family(it.family), it.code, codes)) for it in found)
+    every = tuple(codes.values())
+    shown = Counter(tuple(words_of_print(codes[it.family], it.code, every)) for it in found)
     for of_print, count in shown.most_common(1):
         names = sorted(code.name for code in of_print)
         if len(names) > 1:
@@ -284,8 +286,8 @@ def _of_bands(
 ) -> Iterator[str]:
     """Yield what dots with bands say, seen in an image that was enlarged by a scale."""
     polarity, count = int(np.median(found.bands.polarity)), len(found.words)
-    own = families_of(settings.family_file).values() if settings.family_file else ()
-    known = found.known([code for code in own if isinstance(code, Family)])
+    own = prints_of(settings.family_file).values() if settings.family_file else ()
+    known = found.known([of.design for of in own if isinstance(of.design, Family)])
     rings = settings.narrowed(known or FAMILY_NAMES)
     size = _of_size(count, float(np.median(found.bands.size)) / scale, rings)
     edges = edge_shift_remark(found.growth * polarity / scale)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ahf_ros.codes.families import AUTO, kind_of, mirrored_number
+from ahf_ros.codes.families import AUTO
 from ahf_ros.deprecation import deprecated_arguments
 from ahf_ros.detectors import (
     Contesting,
@@ -102,7 +102,7 @@ def create_identifier(
             used,
             settings,
             interrupt,
-            kinds={it: kind_of(it, settings.detection.family_file) for it in used.families},
+            kinds={it: settings.detection.prints[it].kind for it in used.families},
             narrowed=narrowed,
         )
     return _identifier(Identifier, used, settings, interrupt)
@@ -135,6 +135,7 @@ def _identifier(
         used = used.expecting(listed)
     if isinstance(used, Detector) and isinstance(used, Contesting):
         used = used.contesting()
+    prints = settings.detection.prints
     return kind(
         used,
         settings.adaptive,
@@ -145,9 +146,10 @@ def _identifier(
         interrupt=interrupt,
         contested=settings.detection.report_undecoded,
         patience=used.patience if isinstance(used, EarlyStopping) else 0,
-        mirrored=lambda target: mirrored_number(target.family, target.code),
+        mirrored=lambda it: prints[it.family].mirrored(it.code) if it.family in prints else None,
         name=f'detector {used.name!r}' if isinstance(used, Detector) else 'detector',
         looked_for=used.family if isinstance(used, Detector) else '',
+        prints=prints,
         **more,
     )
 

@@ -92,7 +92,7 @@ class IdentificationSettings:
 
     def check_detector(self) -> None:
         """Refuse a detector that does not identify the family."""
-        detector_name(self.detector, self.detection.family, self.detection.family_file)
+        detector_name(self.detector, self.detection)
 
 
 @dataclass(frozen=True, slots=True)

@@ -244,7 +244,8 @@ class SettlingIdentifier(Identifier):
         turn = self.memory.glanced
         self.memory = replace(self.memory, glanced=turn + 1)
         image = stack.combined(found.combination or stack.names[0])
-        left = without_targets(image, [it for it in found.targets if it.id != UNDECODED])
+        known = [it for it in found.targets if it.id != UNDECODED]
+        left = without_targets(image, known, found.prints)
         parts = _parts(left) if turn >= 0 else [lambda: left]
         looks = [lambda it=it: self._seen(it()) for it in parts]
         if len(parts) > 1:  # where few may not tell which of several families it is

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields
-from typing import TYPE_CHECKING, Any, overload
+from typing import TYPE_CHECKING, Any, Protocol, overload
 
 from ahf_ros.extras import need
 
@@ -207,6 +207,35 @@ Truth = Mapping[str, Sequence[TrueTarget]]
 """The targets of each image, by file name without folders."""
 
 
+class FamilyRecord(Protocol):
+    """What results know of a family; `ahf_ros.codes.families.FamilyPrint` has all of its print."""
+
+    @property
+    def name(self) -> str:
+        """Its name, as targets have it."""
+        ...
+
+    @property
+    def reach(self) -> float:
+        """Radius of the circle that holds a target, in semi-axes of the reported ellipse."""
+        ...
+
+    @property
+    def reading(self) -> Mapping[str, int | str]:
+        """How code words are read: `bits`, `first_bit` and `direction`; empty if none are read."""
+        ...
+
+
+Prints = Mapping[str, FamilyRecord]
+"""Families by their names."""
+
+
+def reach_of(target: Target, prints: Prints) -> float:
+    """Return the radius of a target in semi-axes of its ellipse; 1 if its family is unknown."""
+    of = prints.get(target.family)
+    return of.reach if of else 1.0
+
+
 @dataclass(frozen=True, slots=True)
 class FilterState:
     """The homomorphic filter that led to an identification, and what it cost to find.
@@ -312,6 +341,8 @@ class Identification:
     looked_for : str
         The families that were looked for in this image, separated by commas, or 'auto' for all;
         empty for a detector without families.
+    prints : mapping of str to FamilyRecord
+        The families of the settings by their names, with what is printed of each.
 
     Examples
     --------
@@ -336,6 +367,7 @@ class Identification:
     repeated: tuple[UndecodedTarget, ...] = ()
     unsettled: tuple[UndecodedTarget, ...] = ()
     looked_for: str = ''
+    prints: Prints = field(default_factory=dict, repr=False, compare=False)
 
     def __len__(self) -> int:
         """Return the number of targets, undecoded ones included."""

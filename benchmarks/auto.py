@@ -13,7 +13,7 @@ from itertools import product
 
 import numpy as np
 
-from ahf_ros.codes.families import AUTO, FAMILY_NAMES, kind_of
+from ahf_ros.codes.families import AUTO, FAMILY_NAMES, print_in
 from ahf_ros.evaluation import score, total
 from ahf_ros.session import identify
 from ahf_ros.synthetic.patterns import LIGHT_NAMES, benchmark_lights
@@ -52,7 +52,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 width=round(1400 * spacious),
                 height=round(1000 * spacious),
                 targets=options.targets,
-                dot_radius=RADII.get(kind_of(name), 12.0),
+                dot_radius=RADII.get(print_in(name).kind, 12.0),
                 family=name,
                 light=light,
                 ambient=ambient,

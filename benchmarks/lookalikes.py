@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 
 from ahf_ros.codes.ring import BITS, Family, sectors
-from ahf_ros.synthetic.covers import Cover, ring_cover, stamp_cover
+from ahf_ros.synthetic.covers import Cover, ink_cover, stamp_cover
 from benchmarks.sheets import CELL, Ink
 
 _FINE = 61  # sectors of arcs of any length; a prime, so that they meet no sectors of a family
@@ -106,7 +106,7 @@ LOOKALIKES: dict[str, Callable[[Family, np.random.Generator], Ink]] = {
 
 
 def _ring(family: Family, word: int) -> Ink:
-    return lambda turn: ring_cover(family, word, turn, 0.05)
+    return lambda turn: ink_cover(family.ink(word, 0.05), turn)
 
 
 def _fits(word: int, bits: int, others: int) -> bool:

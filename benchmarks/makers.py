@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 
 from ahf_ros.codes import RING_NAMES
-from ahf_ros.codes.families import FAMILY_NAMES, kind_of
+from ahf_ros.codes.families import FAMILY_NAMES, print_in
 from ahf_ros.detectors import create_detector
 from ahf_ros.detectors.ring.confidence import confidence
 from ahf_ros.evaluation import RIGHT, judge
@@ -96,7 +96,7 @@ def others(seed: int) -> Iterator[Readings]:
             found = create_detector(family=family)(scene.image)
             right = [it.kind == RIGHT for it in judge(scene.targets, found)]
             stated = np.array([it.confidence for it in found])
-            yield maker, kind_of(family), stated, np.array(right, bool)
+            yield maker, print_in(family).kind, stated, np.array(right, bool)
 
 
 def records(readings: Iterator[Readings]) -> list[dict[str, Any]]:

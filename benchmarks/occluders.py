@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 
 from ahf_ros.codes.ring import family
-from ahf_ros.synthetic.covers import ring_cover
+from ahf_ros.synthetic.covers import ink_cover
 from benchmarks.exposure import GAMMA, INK, WHITE, Cell, Covered, Glare, Occluder
 
 _LABEL = 3.8  # radius of the paper that another target is printed on, dot radii
@@ -139,7 +139,7 @@ def other_targets(
         turn = generator.uniform(0, 2 * math.pi)
         x = cell.x - np.float32(distance * math.cos(direction))
         y = cell.y - np.float32(distance * math.sin(direction))
-        ink = ring_cover(code, code.word(number), turn, 0.0)(
+        ink = ink_cover(code.ink(code.word(number), 0.0), turn)(
             x, y, np.eye(2, dtype=np.float32) * cell.width
         )
         gray = WHITE * (1 - (1 - INK) * ink) ** (1 / GAMMA)

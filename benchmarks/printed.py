@@ -18,7 +18,7 @@ import cv2
 import numpy as np
 
 from ahf_ros import FAMILY_NAMES, create_detector
-from ahf_ros.codes.families import KINDS, numbers_of
+from ahf_ros.codes.families import KINDS, print_in
 from ahf_ros.evaluation import Score, score, total
 from ahf_ros.printing.drawing import Drawing
 from ahf_ros.printing.files import pdf_bytes
@@ -69,7 +69,7 @@ def settings_of(name: str, polarity: str, ids: str = '', page: str = 'A5') -> Sh
 
 def sample(name: str, count: int) -> str:
     """Return `count` IDs of a family, evenly among all of them, as settings take them."""
-    every = np.asarray(numbers_of(name))
+    every = np.asarray(print_in(name).design.all_ids)
     which = np.linspace(0, every.size - 1, min(count, every.size)).round().astype(int)
     return ','.join(map(str, every[which].tolist()))
 

@@ -15,8 +15,8 @@ import cv2
 import numpy as np
 
 from ahf_ros.codes.ring import FAMILY_NAMES, family
-from ahf_ros.codes.square import dictionary
-from ahf_ros.synthetic.covers import Cover, ring_cover, square_cover
+from ahf_ros.codes.square import CellPrint, dictionary
+from ahf_ros.synthetic.covers import Cover, ink_cover
 from ahf_ros.target import TrueTarget
 from benchmarks.exposure import GAMMA, INK, WHITE, Cell, Exposure
 
@@ -192,8 +192,9 @@ def target_sheet(
     def ink(number: int) -> Ink:
         if name in FAMILY_NAMES:
             code = family(name)
-            return lambda turn: ring_cover(code, code.word(number), turn, _PINHOLE)
-        return lambda turn: square_cover(name, number, _SQUARE, turn)
+            return lambda turn: ink_cover(code.ink(code.word(number), _PINHOLE), turn)
+        (cells,) = CellPrint(name).ink(number)
+        return lambda turn: ink_cover([replace(cells, half_side=_SQUARE)], turn)
 
     every = map(int, numbers)
     return Sheet(name, seed, **layout).drawn((number, ink(number)) for number in every)

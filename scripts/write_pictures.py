@@ -16,8 +16,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ahf_ros import ImageStack, SceneSettings, create_detector, create_identifier, render
-from ahf_ros.codes.designs import printed_design, proportions
-from ahf_ros.codes.families import numbers_of
+from ahf_ros.codes.designs import contours
+from ahf_ros.codes.families import print_in
 from ahf_ros.codes.ring import canonical, family
 from ahf_ros.detectors.contract import DetectorSettings
 from ahf_ros.detectors.ring.circles import REACH
@@ -84,10 +84,10 @@ def printed() -> dict[str, bytes]:
     """Return the picture of each family."""
     contents = {}
     for name, number in FAMILIES.items():
-        design = printed_design(name, number, 0.0)
-        assert number in numbers_of(name)
-        radius = SIDE / 2 / proportions(name).quiet_zone
-        ink = Ink(f'{name} {number}', SIDE / 2, SIDE / 2, radius, design.contours)
+        design = print_in(name).design
+        radius = SIDE / 2 / design.proportions.quiet_zone
+        outlines = contours(design.ink(design.word(number)))
+        ink = Ink(f'{name} {number}', SIDE / 2, SIDE / 2, radius, outlines)
         page = Drawing(SIDE, SIDE, (ink,), (), ())
         contents[name] = svg_bytes(page, ink.name)
     return contents

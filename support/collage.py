@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ahf_ros.codes.designs import proportions
+from ahf_ros.codes.families import print_in
 from ahf_ros.synthetic.layout import quiet_radius
 from ahf_ros.synthetic.scene import SceneSettings, render
 from ahf_ros.target import TrueTarget
@@ -68,5 +68,5 @@ def collage(radii: Sequence[float], family: str = 'metashape12', **settings: Any
 
 def _side(radius: float, family: str) -> int:
     """Return the side of a scene that holds one target, px."""
-    zone = proportions(family).quiet_zone
+    zone = print_in(family).design.proportions.quiet_zone
     return ceil(2.02 * float(quiet_radius(radius, 2 * _FOCAL_LENGTH * zone * radius, zone)))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import asdict
@@ -22,7 +21,7 @@ from ahf_ros.edge_shift import edge_shift_remark
 from ahf_ros.imaging.image import check_image, white_remark
 from ahf_ros.interchange.image_files import read_noted_image, write_image
 from ahf_ros.interchange.target_json import to_json
-from ahf_ros.opening import Most, is_url, read_bytes, url_fingerprint
+from ahf_ros.opening import is_url, url_fingerprint
 from ahf_ros.session import create_identifier
 from ahf_ros.session_settings import IdentificationSettings
 from ahf_ros.settling import memory_of
@@ -94,7 +93,6 @@ def identify_images(task: ImageTask, report: Report = no_report) -> ImageOutcome
                 split=part.split,
                 upright=task.upright,
                 mapping=asdict(task.settings.adaptive.filter),
-                family_file=task.settings.detection.family_file,
             )
             records.append(record)
             if overlays:
@@ -104,21 +102,12 @@ def identify_images(task: ImageTask, report: Report = no_report) -> ImageOutcome
 
 
 def detector_of(settings: IdentificationSettings) -> Detector:
-    """Return the detector of settings, the same one as long as its data file does not change."""
-    digest = files_digest(settings.detection.family_file)
-    return _detector(settings.detector, settings.detection, digest)
-
-
-def files_digest(files: str) -> str:
-    """Return a text that differs where the content of files, separated by commas, does."""
-    digest = hashlib.sha256()
-    for path in files.split(',') if files else ():
-        digest.update(hashlib.sha256(read_bytes(path.strip(), Most.YAML)).digest())
-    return digest.hexdigest()
+    """Return the detector of settings, the same one for the same families."""
+    return _detector(settings.detector, settings.detection)
 
 
 @lru_cache(maxsize=4)
-def _detector(name: str, settings: DetectorSettings, digest: str) -> Detector:
+def _detector(name: str, settings: DetectorSettings) -> Detector:
     return create_detector(name, settings=settings)
 
 

@@ -20,7 +20,7 @@ from shutil import copyfileobj
 from typing import Any
 
 from ahf_ros.batch.engine import Engine, Finished, TaskFailed, finished_tasks, in_order
-from ahf_ros.batch.identification import file_fingerprint, files_digest
+from ahf_ros.batch.identification import file_fingerprint
 from ahf_ros.batch.task import ImageOutcome, ImageTask, Level, Message
 from ahf_ros.inputs import check_output
 from ahf_ros.interchange.files import RESULTS_FILE
@@ -254,8 +254,8 @@ class Results:
 def _fingerprint(task: ImageTask) -> str:
     """Return a text that differs where settings of a task lead to other results."""
     values = flat_values(task.settings)
-    if files := task.settings.detection.family_file:
-        values['family_file'] = files_digest(files)
+    prints = task.settings.detection.prints.values()
+    values['family_file'] = ' '.join(of.digest for of in prints if of.file)
     del values['threads']  # which does not change results
     movement = task.stacking.stack_movement
     values |= {'stack_movement': movement, 'stacked': task.stacked, 'upright': task.upright}

@@ -112,4 +112,5 @@ def tile(title: str, image: np.ndarray, found: Identification, truth: tuple[Targ
         (f'{len(missed)} missed', MISSED_COLOUR),
     ]
     unit = max(1, image.shape[1] // WIDTH)
-    return Tile(overlay(image, found.targets, wrong, missed, unit), title, remarks)
+    drawn = overlay(image, found.targets, wrong, missed, unit, prints=found.prints)
+    return Tile(drawn, title, remarks)

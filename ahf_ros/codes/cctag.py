@@ -7,23 +7,24 @@ is left in the middle is white. The tables of radii that the authors print follo
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy as np
 
+from ahf_ros.codes.prints import Disc, Print, Proportions, Shape
+
+_QUIET_ZONE = 1.5  # in radii of the outermost circle, which is the dot
 _WIDTHS = {'cctag3': (5, 0.10, 0.15), 'cctag4': (7, 0.08, 0.12)}
 
 
 @dataclass(frozen=True, slots=True)
-class CircleFamily:
+class CircleFamily(Print):
     """The CCTags of one number of black rings.
 
     `bits` is the number of rings, black and white, that are read; `narrow` and `wide` are their
     widths in radii of the outermost circle.
     """
-
-    kind: ClassVar[str] = 'cctag'
 
     name: str
     bits: int
@@ -35,6 +36,16 @@ class CircleFamily:
         """All IDs, ndarray of int64, ascending."""
         return np.arange(1 << self.bits)
 
+    @property
+    def all_ids(self) -> Sequence[int]:
+        """All IDs, ascending."""
+        return range(1 << self.bits)
+
+    @property
+    def proportions(self) -> Proportions:
+        """What all targets have in common."""
+        return Proportions(reach=1.0, radius=1.0, quiet_zone=_QUIET_ZONE, radii={'dot': 1.0})
+
     def word(self, number: int) -> int:
         """Return the code word of an ID, which is the same; raise a ValueError if none is."""
         if not 0 <= number < 1 << self.bits:
@@ -43,6 +54,11 @@ class CircleFamily:
                 f'{(1 << self.bits) - 1}'
             )
         return number
+
+    def ink(self, word: int, pinhole: float = 0.0) -> tuple[Shape, ...]:
+        """Return the black rings of a word, from the outside inwards."""
+        radii = self.radii(np.array([word]))[0].tolist()
+        return tuple(Disc(*ends) for ends in zip(radii[::2], radii[1::2], strict=True))
 
     def radii(self, numbers: np.ndarray) -> np.ndarray:
         """Return the radii of the circles of IDs (k,), from 1 inwards, shape (k, bits + 1)."""

@@ -2,26 +2,43 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, TypeVar
+from typing import Any, ClassVar, TypeVar
 
 import numpy as np
+
+from ahf_ros.codes.prints import Print
 
 Words = TypeVar('Words', int, np.ndarray)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class CyclicFamily:
+class CyclicFamily(Print):
     """Code words of `bits` bits, and their IDs, which are above 0.
 
     `words` has the canonical ones, ndarray of int64, shape (n,), ascending; `numbers` are their
     IDs. Both are read-only.
     """
 
+    has_pinhole: ClassVar[bool] = True
+    direction: ClassVar[str]  # in which words are read
+
     name: str
     bits: int
     words: np.ndarray
     numbers: np.ndarray
+
+    @property
+    def all_ids(self) -> Sequence[int]:
+        """All IDs, ascending."""
+        ids: list[int] = sorted(self.numbers.tolist())
+        return ids
+
+    @property
+    def reading(self) -> dict[str, int | str]:
+        """How words are read."""
+        return {'bits': self.bits, 'first_bit': 'lowest', 'direction': self.direction}
 
     def canonical(self, words: Any) -> np.ndarray:
         """Return the smallest of all words that are the same code, ndarray of int64."""
@@ -59,6 +76,12 @@ class CyclicFamily:
         order = np.argsort(self.numbers)
         found: np.ndarray = self.words[order[np.searchsorted(self.numbers, numbers, sorter=order)]]
         return found
+
+    def orbits(self, numbers: np.ndarray) -> np.ndarray:
+        """Return all rotations of the word of each ID, ndarray of uint64, shape (n, k)."""
+        words = self.words_of(numbers)
+        turned = [rotated_words(words, turn, self.bits) for turn in range(self.bits)]
+        return np.stack(turned, axis=1).astype(np.uint64)
 
 
 def smallest_rotation(words: Any, bits: int) -> np.ndarray:

@@ -1,31 +1,14 @@
-"""Printed designs of the families: the outlines of the ink, and the free area about it.
-
-Lengths are in radii of the dot, with x to the right and y upwards as printed. The origin is the
-centre of the target. The corner or edge where the reading of a word begins lies on the x axis.
-"""
+"""Outlines of printed targets: closed contours of the shapes of their ink, for printers."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
-from functools import cache
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
 
 import numpy as np
 
-from ahf_ros.codes.cctag import CircleFamily
-from ahf_ros.codes.dots import DotFamily
-from ahf_ros.codes.families import FAMILY_NAMES, code_family
-from ahf_ros.codes.gsi import PointFamily
-from ahf_ros.codes.ring import Family, sectors
-from ahf_ros.codes.square import SQUARE_NAMES, marker
-
-HALF_SIDE = 2.4
-"""Half the side of a square marker, in radii of the dot of a ring target of the same size."""
-
-_WIDER = 1.2  # times the reach of a ring target
-_QUIET_ZONE = 4.2  # of ring targets and square markers at least: that of a band up to 3.5
-_MARGIN = 1.0  # about the outermost dot or border of the other families, in radii of the dot
-_CCTAG_ZONE = 1.5  # of CCTags, in radii of the outermost circle, which is their dot
+from ahf_ros.codes.prints import Cells, Disc, Ring, Sectors, Shape
 
 Point = tuple[float, float]
 
@@ -45,118 +28,30 @@ Contour = tuple[Point | Arc, ...]
 """A closed outline: corners and arcs in their order, joined by straight lines."""
 
 
-@dataclass(frozen=True, slots=True)
-class Proportions:
-    """What the targets of a family have in common; lengths are in radii of the dot.
-
-    `reach` is the radius of the circle that holds all ink, `radius` that of the circle whose image
-    is reported as the ellipse of the target, and `quiet_zone` that of the area that is left free.
-    `radii` has the lengths of the design by their names. `pinhole` is the radius of the hole in
-    the dot, 0 for none, and `polarity` the colour of the ink, 'dark' or 'bright'.
-    """
-
-    reach: float
-    radius: float
-    quiet_zone: float
-    radii: dict[str, float]
-    pinhole: float = 0.0
-    polarity: str = 'dark'
-
-    def chosen(self, polarity: str, pinhole: float) -> Proportions:
-        """Return those of a print whose colour and hole are chosen.
-
-        They are the family's where the colour is 'auto' and the hole negative.
-        """
-        return replace(
-            self,
-            polarity=self.polarity if polarity == 'auto' else polarity,
-            pinhole=self.pinhole if pinhole < 0 else pinhole,
-        )
-
-
-@dataclass(frozen=True, slots=True)
-class PrintedDesign:
-    """The print of one code word: a point inside an odd number of contours is inked."""
-
-    code: int
-    contours: tuple[Contour, ...]
-
-
-def proportions(name: str, file: str = '') -> Proportions:
-    """Return what the targets of a family have in common; `file` is as for `code_family`.
+def contours(ink: Iterable[Shape]) -> tuple[Contour, ...]:
+    """Return the outlines of shapes: a point inside an odd number of contours is inked.
 
     Examples
     --------
-    >>> proportions('metashape12').radii
-    {'dot': 1.0, 'band_inner': 2.25, 'band_outer': 3.5}
-    """
-    if name in SQUARE_NAMES:
-        reach, radii = HALF_SIDE * 2**0.5, {'half_side': HALF_SIDE}
-        return Proportions(reach=reach, radius=HALF_SIDE, quiet_zone=_QUIET_ZONE, radii=radii)
-    code, radius, radii = code_family(name, file), 1.0, {'dot': 1.0}
-    if isinstance(code, CircleFamily):
-        return Proportions(reach=1.0, radius=radius, quiet_zone=_CCTAG_ZONE, radii=radii)
-    pinhole, polarity = 0.0, 'dark'
-    if isinstance(code, Family):
-        radii |= {'band_inner': code.band_inner, 'band_outer': code.band_outer}
-        for number, of in enumerate(code.circles, 1):
-            radii |= {f'circle_{number}_inner': of[0], f'circle_{number}_outer': of[1]}
-        reach, quiet_zone = code.reach, max(_QUIET_ZONE, _WIDER * code.reach)
-        pinhole, polarity = code.pinhole, 'bright' if code.polarity == 'bright' else 'dark'
-    elif isinstance(code, DotFamily):
-        radii |= {'dot_circle': code.dot_circle, 'small_dot': code.dot_radius}
-        radii |= {'ground': code.ground_radius, 'border': code.border_radius}
-        reach, quiet_zone = code.border_radius, code.border_radius + _MARGIN
-        pinhole = code.pinhole
-    else:
-        radius = float(code.template_radii[code.reference] / code.dot_radius)
-        reach = code.reach / code.dot_radius
-        quiet_zone = reach + _MARGIN
-    return Proportions(reach, radius, quiet_zone, radii, pinhole, polarity)
-
-
-@cache
-def relative_reach(name: str) -> float:
-    """Return the radius of a target, in semi-axes of the ellipse that is reported.
-
-    A target of a family that is not known ends with its ellipse.
-
-    Examples
-    --------
-    >>> relative_reach('metashape12'), relative_reach('mine')
-    (3.5, 1.0)
-    """
-    if name not in FAMILY_NAMES:
-        return 1.0
-    design = proportions(name)
-    return design.reach / design.radius
-
-
-def printed_design(name: str, number: int, pinhole: float, file: str = '') -> PrintedDesign:
-    """Return the print of the target of a family with an ID; `file` is as for `code_family`.
-
-    `pinhole` is the radius of the hole in the centre of the dot, in radii of the dot, 0 for none;
-    square markers, point-distributed targets and CCTags have none. Raise a ValueError if the
-    family has no such ID, too.
-
-    Examples
-    --------
-    >>> len(printed_design('metashape12', 1, 0.05).contours)  # dot, hole, two arcs of the band
+    >>> from ahf_ros.codes.ring import family
+    >>> rings = family('metashape12')
+    >>> len(contours(rings.ink(rings.word(1), pinhole=0.05)))  # dot, hole, two arcs of the band
     4
     """
-    if name in SQUARE_NAMES:
-        return PrintedDesign(code=number, contours=tuple(_square_contours(name, number)))
-    code = code_family(name, file)
-    word = code.word(number)
-    if isinstance(code, PointFamily):
-        return PrintedDesign(code=word, contours=tuple(_point_contours(code, word)))
-    if isinstance(code, CircleFamily):
-        radii = code.radii(np.array([word]))[0].tolist()
-        return PrintedDesign(code=word, contours=tuple(map(circle, radii)))
-    centre = [circle(1.0)] + [circle(pinhole)] * (pinhole > 0)
-    if isinstance(code, Family):
-        return PrintedDesign(code=word, contours=(*centre, *_band_contours(code, word)))
-    return PrintedDesign(code=word, contours=(*centre, *_dot_ring_contours(code, word)))
+    return tuple(contour for shape in ink for contour in _contours(shape))
+
+
+def _contours(shape: Shape) -> Iterator[Contour]:
+    if isinstance(shape, Disc):
+        yield circle(shape.radius, shape.x, shape.y)
+        if shape.hole:
+            yield circle(shape.hole, shape.x, shape.y)
+    elif isinstance(shape, Ring):
+        yield from (circle(shape.inner), circle(shape.outer))
+    elif isinstance(shape, Sectors):
+        yield from _arcs(shape)
+    else:
+        yield from _sides(shape)
 
 
 def circle(radius: float, x: float = 0.0, y: float = 0.0) -> Contour:
@@ -164,39 +59,23 @@ def circle(radius: float, x: float = 0.0, y: float = 0.0) -> Contour:
     return (Arc(x=x, y=y, radius=radius, start=0.0, extent=2 * math.pi),)
 
 
-def _band_contours(table: Family, word: int) -> list[Contour]:
-    """Return the outlines of the arcs of a band; sectors side by side are one arc."""
-    inked = sectors(word, table.bits)
-    sector = 2 * math.pi / table.bits
-    contours: list[Contour] = []
+def _arcs(band: Sectors) -> Iterator[Contour]:
+    """Yield the outlines of the arcs of a band; sectors side by side are one arc."""
+    inked = np.array(band.inked)
+    sector = 2 * math.pi / len(inked)
     for first in np.flatnonzero(inked & ~np.roll(inked, 1)).tolist():
         count = int(np.argmin(np.roll(inked, -first)))
         start, extent = first * sector, count * sector
-        outer = Arc(x=0.0, y=0.0, radius=table.band_outer, start=start, extent=extent)
-        inner = Arc(x=0.0, y=0.0, radius=table.band_inner, start=start + extent, extent=-extent)
-        contours.append((outer, inner))
-    return contours + [circle(radius) for of in table.circles for radius in of]
+        outer = Arc(x=0.0, y=0.0, radius=band.outer, start=start, extent=extent)
+        yield outer, Arc(x=0.0, y=0.0, radius=band.inner, start=start + extent, extent=-extent)
 
 
-def _dot_ring_contours(table: DotFamily, word: int) -> list[Contour]:
-    dots = [circle(table.dot_radius, x, y) for x, y in table.places(word).tolist()]
-    return [*dots, circle(table.ground_radius), circle(table.border_radius)]
-
-
-def _point_contours(table: PointFamily, word: int) -> list[Contour]:
-    places, radii = table.dots(word)
-    dots = np.column_stack([radii, places]) / table.dot_radius
-    return [circle(*dot) for dot in dots.tolist()]
-
-
-def _square_contours(name: str, number: int) -> list[Contour]:
-    cells = marker(name, number, 1) == 0
-    side = len(cells)
-    scale = 2 * HALF_SIDE / side
-    return [
-        tuple(((x - side / 2) * scale, (side / 2 - y) * scale) for x, y in corners)
-        for corners in _outlines(cells)
-    ]
+def _sides(cells: Cells) -> Iterator[Contour]:
+    """Yield the polygons about the inked cells."""
+    side = len(cells.inked)
+    scale = 2 * cells.half_side / side
+    for corners in _outlines(np.array(cells.inked)):
+        yield tuple(((x - side / 2) * scale, (side / 2 - y) * scale) for x, y in corners)
 
 
 def _outlines(cells: np.ndarray) -> list[list[tuple[int, int]]]:

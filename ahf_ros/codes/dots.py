@@ -18,10 +18,13 @@ import numpy as np
 from ahf_ros.codes.cyclic import CyclicFamily, mirrored_words, smallest_rotation
 from ahf_ros.codes.data_file import pinhole_in, read_data_file
 from ahf_ros.codes.kept import kept_while_unchanged
+from ahf_ros.codes.prints import Disc, Proportions, Ring, Shape
 from ahf_ros.opening import reader
 
 DOTS_DESIGN = Path(__file__).with_name('dots.json')
 """The design of rings of dots that this package prints."""
+
+_MARGIN = 1.0  # about the border, in radii of the disc
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -32,7 +35,7 @@ class DotFamily(CyclicFamily):
     own radius, the inner and outer radius of the border, and the radius of the hole in the disc.
     """
 
-    kind: ClassVar[str] = 'dots'
+    direction: ClassVar[str] = 'either'
 
     dot_circle: float
     dot_radius: float
@@ -40,9 +43,37 @@ class DotFamily(CyclicFamily):
     border_radius: float
     pinhole: float = 0.0
 
+    @property
+    def proportions(self) -> Proportions:
+        """What all targets have in common."""
+        return Proportions(
+            reach=self.border_radius,
+            radius=1.0,
+            quiet_zone=self.border_radius + _MARGIN,
+            radii={
+                'dot': 1.0,
+                'dot_circle': self.dot_circle,
+                'small_dot': self.dot_radius,
+                'ground': self.ground_radius,
+                'border': self.border_radius,
+            },
+            pinhole=self.pinhole,
+        )
+
+    def ink(self, word: int, pinhole: float = 0.0) -> tuple[Shape, ...]:
+        """Return disc, small dots and border of a word."""
+        dots = [Disc(self.dot_radius, 0.0, x, y) for x, y in self.places(word).tolist()]
+        return (Disc(1.0, pinhole), *dots, Ring(self.ground_radius, self.border_radius))
+
     def canonical(self, words: Any) -> np.ndarray:
         """Return the smallest of all words that are the same code, ndarray of int64."""
         return smallest_bracelet(words, self.bits)
+
+    def orbits(self, numbers: np.ndarray) -> np.ndarray:
+        """Return all rotations and reflections of the word of each ID, shape (n, k)."""
+        turned = CyclicFamily.orbits(self, numbers).astype(np.int64)
+        both = np.concatenate([turned, mirrored_words(turned, self.bits)], axis=1)
+        return both.astype(np.uint64)
 
     def places(self, word: int, turn: float = 0.0) -> np.ndarray:
         """Return the centres of the small dots of a word, shape (n, 2), in radii of the disc.

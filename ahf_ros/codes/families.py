@@ -6,21 +6,19 @@ anything. Therefore the codes, which take numpy and OpenCV, are imported where t
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterable, Sequence
-from contextlib import suppress
+from collections.abc import Container, Iterable
+from dataclasses import dataclass
 from difflib import get_close_matches
-from functools import lru_cache
+from functools import cached_property, lru_cache
+from hashlib import sha256
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Any
 
-from ahf_ros.codes import APRILTAG_NAMES, ARUCO_NAMES, CCTAG_NAMES, RING_NAMES, SQUARE_NAMES
+from ahf_ros.codes import APRILTAG_NAMES, ARUCO_NAMES, CCTAG_NAMES, RING_NAMES
 from ahf_ros.codes.kept import kept_while_unchanged
 
 if TYPE_CHECKING:
-    from ahf_ros.codes.cctag import CircleFamily
-    from ahf_ros.codes.dots import DotFamily
-    from ahf_ros.codes.gsi import PointFamily
-    from ahf_ros.codes.ring import Family
+    from ahf_ros.codes.prints import Print
 
 KINDS: dict[str, tuple[str, ...]] = {
     'ring': RING_NAMES,
@@ -32,9 +30,7 @@ KINDS: dict[str, tuple[str, ...]] = {
 }
 """The families of each kind."""
 
-_KIND_OF = {name: kind for kind, names in KINDS.items() for name in names}
-
-FAMILY_NAMES = tuple(_KIND_OF)
+FAMILY_NAMES = tuple(name for names in KINDS.values() for name in names)
 """The families that `family` accepts."""
 
 AUTO = 'auto'
@@ -49,63 +45,113 @@ ACCEPTED = (
 ONE = f'one of {", ".join(FAMILY_NAMES)}, or the family of a family_file'
 """The same where it is a single family."""
 
-Code = TypeVar('Code', 'Family', 'DotFamily', 'PointFamily', 'CircleFamily')
-"""The codes of families of one kind."""
-
 _ENDINGS = '.yaml', '.yml', '.json'  # of data files
 _SHOWN = 10  # IDs in an error
 _ALIKE = 0.65, 0.65, 0.85, 0.85  # share of letters of a name that is suggested, by `_ways`
+_REPLACED = {'gsi', 'dots'}  # families in whose place data files of their kind come
 
 
-def families_in(text: str, files: str = '') -> tuple[str, ...]:
-    """Return the different families that a text names, in its order.
+@dataclass(frozen=True)
+class FamilyPrint:
+    """A family that a text named, and its print, which is read when something of it is needed.
+
+    Attributes
+    ----------
+    name : str
+        Its name in results.
+    kind : str
+        One of `KINDS`.
+    file, digest : str
+        The data file that describes it and a hash of that; empty for `FAMILY_NAMES`.
+    """
+
+    name: str
+    kind: str
+    file: str = ''
+    digest: str = ''
+
+    @cached_property
+    def design(self) -> Print:
+        """The print."""
+        return _described(self.file).design if self.file else _usual_design(self)
+
+    @cached_property
+    def reach(self) -> float:
+        """Radius of the circle that holds a target, in semi-axes of the reported ellipse."""
+        common = self.design.proportions
+        return common.reach / common.radius
+
+    @property
+    def reading(self) -> dict[str, int | str]:
+        """How words are read, see `Print`; empty for square markers, whose code is no word."""
+        return self.design.reading
+
+    def mirrored(self, word: int) -> int | None:
+        """Return the ID that a word has in a mirror, see `Print`."""
+        return self.design.mirrored(word)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Leave the print to the process that needs it."""
+        return FamilyPrint, (self.name, self.kind, self.file, self.digest)
+
+
+_USUAL = {name: FamilyPrint(name, kind) for kind, names in KINDS.items() for name in names}
+
+
+def prints_in(text: str, files: str = '') -> dict[str, FamilyPrint]:
+    """Return the different families that a text names, by their names and in its order.
 
     It names a family, several separated by commas, or 'auto' for all. `files` are data files,
-    separated by commas, that describe more families. Raise a ValueError if there is no family, if
-    one is unknown or named twice, or if a file is not accepted.
+    separated by commas, that describe more families; one of the kind of `gsi` or `dots` takes the
+    place of these, by its own name. Raise a ValueError if there is no family, if one is unknown or
+    named twice, or if a file is not accepted.
 
     Examples
     --------
-    >>> families_in('metashape12, apriltag_36h11')
-    ('metashape12', 'apriltag_36h11')
-    >>> families_in('DICT_4X4_50'), families_in('tag36h11')
-    (('aruco_4x4_50',), ('apriltag_36h11',))
-    >>> families_in('auto') == FAMILY_NAMES
+    >>> list(prints_in('metashape12, apriltag_36h11'))
+    ['metashape12', 'apriltag_36h11']
+    >>> [*prints_in('DICT_4X4_50'), *prints_in('tag36h11')]
+    ['aruco_4x4_50', 'apriltag_36h11']
+    >>> tuple(prints_in('auto')) == FAMILY_NAMES
     True
+    >>> prints_in('gsi')['gsi'].design.word(18)
+    16464
     """
-    return _families_in(text, files) if files else _usual_families_in(text)
+    return _prints_in(text, files) if files else _usual_prints_in(text)
 
 
-def _families_in(text: str, files: str) -> tuple[str, ...]:
-    kinds = {name: kind for kind, of_kind in KINDS.items() for name in of_kind}
+def _prints_in(text: str, files: str) -> dict[str, FamilyPrint]:
     given = [part.strip() for part in text.split(',')]
-    own: dict[str, str] = {}
-    if files and not {_usual_name(name, kinds) for name in given} <= set(kinds):
-        own = {name: code.kind for name, code in families_of(files).items()}
-        kinds |= own
-    if text == AUTO:  # a file takes the place of a usual design
-        return tuple(name for name in kinds if name in own or name not in own.values())
-    names = tuple(_usual_name(name, kinds) for name in given)
+    own: dict[str, FamilyPrint] = {}
+    if files and not {_usual_name(name, _USUAL) for name in given} <= set(_USUAL) - _REPLACED:
+        own = prints_of(files)
+    known = _USUAL | own
+    of_kinds = {it.kind: it for it in reversed(own.values()) if it.kind in _REPLACED}
+    if text == AUTO:
+        return {name: it for name, it in known.items() if name in own or name not in of_kinds}
+    found: dict[str, FamilyPrint] = {}
     shown = f'family is {text!r}'
-    for name in names:
-        if name not in kinds:
-            where = f'{shown}, which names {name!r}' if len(names) > 1 else shown
+    for name in (_usual_name(it, known) for it in given):
+        if name not in known:
+            where = f'{shown}, which names {name!r}' if len(given) > 1 else shown
             alike = [
                 match
                 for way, least in zip(_ways(name), _ALIKE, strict=True)
-                for match in get_close_matches(way, list(kinds), 1, least)
+                for match in get_close_matches(way, list(known), 1, least)
                 if name
             ]
             accepted = f'{alike[0]}, which is most like it, or another family' if alike else ''
             raise ValueError(f'{where}, accepted is {accepted or ACCEPTED}')
-        if sum(name in (it, own.get(it)) for it in names) > 1:
+        resolved = known[name] if name in own else of_kinds.get(name, known[name])
+        if resolved.name in found:
             raise ValueError(f'{shown}, which names {name} twice, accepted is each family once')
-    return names
+        found[resolved.name] = resolved
+    return found
 
 
 @lru_cache(maxsize=256)
-def _usual_families_in(text: str) -> tuple[str, ...]:
-    return _families_in(text, '')
+def _usual_prints_in(text: str) -> dict[str, FamilyPrint]:
+    return _prints_in(text, '')
 
 
 def _usual_name(name: str, kinds: Container[str]) -> str:
@@ -119,99 +165,63 @@ def _ways(name: str) -> tuple[str, ...]:
     return name, plain, f'aruco_{plain}', f'apriltag_{plain.removeprefix("tag")}'
 
 
-def family_in(text: str, files: str = '') -> str:
-    """Return the one family that a text names; `files` are as for `families_in`.
+def print_in(text: str, files: str = '') -> FamilyPrint:
+    """Return the one family that a text names; `files` are as for `prints_in`.
 
     Raise a ValueError if it names none, or several.
     """
-    names = families_in(text, files)
-    if len(names) > 1 or text == AUTO:
+    found = prints_in(text, files)
+    if len(found) > 1 or text == AUTO:
         raise ValueError(f'family is {text!r}, accepted is one family')
-    return names[0]
+    return next(iter(found.values()))
 
 
-def kind_of(name: str, files: str = '') -> str:
-    """Return the kind of a family, see `KINDS`; `files` are as for `families_in`."""
-    return _KIND_OF.get(name) or families_of(files)[name].kind
+def _usual_design(of: FamilyPrint) -> Print:
+    """Return the print of a family that this package brings along."""
+    from ahf_ros.codes import cctag, dots, gsi, ring, square
 
-
-def code_family(name: str, files: str = '') -> Family | DotFamily | PointFamily | CircleFamily:
-    """Return the codes and the proportions of a family that is not of square markers.
-
-    `files` are data files, separated by commas: of families of their own names, or of `gsi` and
-    `dots` in the place of the usual design. Raise a ValueError if there is no such family, or a
-    data file is not accepted.
-    """
-    from ahf_ros.codes import cctag, dots, gsi, ring
-
-    if name in CCTAG_NAMES:
-        return cctag.circle_family(name)
-    if files and name not in RING_NAMES:
-        own = families_of(files)
-        for code in own.values():
-            if name in (code.name, code.kind):
-                return code
-        if name not in FAMILY_NAMES:
-            raise ValueError(
-                f'family is {name!r}, and family_file is {files!r}, which describes '
-                f'{", ".join(own)}; accepted is one of these'
-            )
-    if name == 'gsi':
+    if of.kind == 'ring':
+        return ring.family(of.name)
+    if of.kind == 'cctag':
+        return cctag.circle_family(of.name)
+    if of.kind == 'gsi':
         return gsi.point_family()
-    return dots.dot_family() if name == 'dots' else ring.family(name)
+    return dots.dot_family() if of.kind == 'dots' else square.CellPrint(of.name)
 
 
-def family_of(of_kind: type[Code], families: Sequence[str], files: str = '') -> tuple[Code, ...]:
-    """Return the codes of families of one kind, each as for `code_family`.
-
-    Raise a ValueError if one of them is of another kind.
-    """
-    codes = [code_family(name, files) for name in families]
-    found = tuple(code for code in codes if isinstance(code, of_kind))
-    if len(found) < len(codes):
-        raise ValueError(f'family is {", ".join(families)!r}, accepted are other families')
-    return found
-
-
-def families_of(files: str) -> dict[str, Family | DotFamily | PointFamily]:
+def prints_of(files: str) -> dict[str, FamilyPrint]:
     """Return the families that data files describe, by their names.
 
     The names of the files are separated by commas. Each is of point-distributed targets, rings of
     dots, or rings, as its fields tell. Raise a ValueError, which names file, line and field, if
     one is not accepted.
     """
-    found: dict[str, Family | DotFamily | PointFamily] = {}
+    found: dict[str, FamilyPrint] = {}
     for path in (part.strip() for part in files.split(',')):
-        code = _described(path)
-        if code.name in (*RING_NAMES, *SQUARE_NAMES, *CCTAG_NAMES, *found):
+        of = _described(path)
+        if of.name in found or (of.name in _USUAL and of.name not in _REPLACED):
             from ahf_ros.codes.data_file import read_data_file
 
             name = dict(read_data_file(path).items())['family']
             name.refuse('a name that no other family has')
-        found[code.name] = code
+        found[of.name] = of
     return found
 
 
 @kept_while_unchanged
-def _described(path: str) -> Family | DotFamily | PointFamily:
-    """Return the family that a data file describes."""
+def _described(path: str) -> FamilyPrint:
+    """Return the family that a data file describes, with its print."""
     from ahf_ros.codes import dots, gsi, ring
     from ahf_ros.codes.data_file import read_data_file
+    from ahf_ros.opening import Most, read_bytes
 
     fields = dict(read_data_file(path).items())
-    if 'template' in fields:
-        return gsi.point_family(path)
-    return dots.dot_family(path) if 'dot_circle' in fields else ring.ring_family(path)
-
-
-def colours_of(families: Sequence[str], files: str) -> str:
-    """Return the colour of the dots of families, 'dark', 'bright' or 'both'; see `code_family`."""
-    kinds = [kind_of(name, files) for name in families]
-    colours = {
-        getattr(code_family(name, files), 'polarity', 'both') if kind == 'ring' else 'both'
-        for name, kind in zip(families, kinds, strict=True)
-    }
-    return colours.pop() if len(colours) == 1 else 'both'
+    kind = 'gsi' if 'template' in fields else 'dots' if 'dot_circle' in fields else 'ring'
+    read = {'gsi': gsi.point_family, 'dots': dots.dot_family, 'ring': ring.ring_family}[kind]
+    design: Print = read(path)
+    of = FamilyPrint(design.name, kind, path, sha256(read_bytes(path, Most.YAML)).hexdigest())
+    vars(of)['design'] = design  # as if it had been asked for, while the file is like that
+    return of
 
 
 def files_by_name(text: str, files: str, folders: Iterable[Path]) -> str:
@@ -224,46 +234,19 @@ def files_by_name(text: str, files: str, folders: Iterable[Path]) -> str:
     for name in (part.strip() for part in text.split(',')):
         if name == AUTO or _usual_name(name, FAMILY_NAMES) in FAMILY_NAMES:
             continue
-        if not name.isidentifier() or (files and name in families_of(files)):
+        if not name.isidentifier() or (files and name in prints_of(files)):
             continue
         paths = [folder / f'{name}{ending}' for folder in places for ending in _ENDINGS]
         found += [str(path) for path in paths if path.is_file()][:1]
     return ','.join(found)
 
 
-def numbers_of(name: str, file: str = '') -> Sequence[int]:
-    """Return the IDs of a family, ascending; `file` is as for `code_family`."""
-    from ahf_ros.codes import square
-
-    if name in SQUARE_NAMES:
-        return range(len(square.dictionary(name).bytesList))
-    return sorted(code_family(name, file).numbers.tolist())
-
-
-def code_reading(name: str, files: str = '') -> dict[str, int | str]:
-    """Return how code words of a family are read: `bits`, `first_bit` and `direction`.
-
-    It is empty for families whose code is no word, such as square markers, and for unknown ones.
-    `files` are as for `families_in`.
-    """
-    from ahf_ros.codes import cyclic, gsi
-
-    bits, direction = 0, 'by position'
-    with suppress(ValueError):
-        code = code_family(name, files)
-        if isinstance(code, gsi.PointFamily):
-            bits = int(code.position_numbers.max()) + 1
-        elif isinstance(code, cyclic.CyclicFamily):
-            bits, direction = code.bits, 'either' if code.kind == 'dots' else 'counter-clockwise'
-    return {'bits': bits, 'first_bit': 'lowest', 'direction': direction} if bits else {}
-
-
-def check_numbers(field: str, numbers: Iterable[int], families: Sequence[str], file: str) -> None:
+def check_numbers(field: str, numbers: Iterable[int], prints: Iterable[FamilyPrint]) -> None:
     """Refuse numbers that are no ID of any of some families.
 
-    The ValueError calls them `field` and names them; `file` is as for `code_family`.
+    The ValueError calls them `field` and names them.
     """
-    known = {name: numbers_of(name, file) for name in families}
+    known = {it.name: it.design.all_ids for it in prints}
     missing = sorted(set(numbers).difference(*known.values()))
     if not missing:
         return
@@ -272,22 +255,3 @@ def check_numbers(field: str, numbers: Iterable[int], families: Sequence[str], f
         shown += f' and {len(missing) - _SHOWN} more'
     accepted = ', '.join(f'{name} from {ids[0]} to {ids[-1]}' for name, ids in known.items())
     raise ValueError(f'{field} has {shown}, accepted are IDs of {accepted}')
-
-
-def mirrored_number(name: str, code: int) -> int | None:
-    """Return the ID that a code word of a family has in a mirror.
-
-    It is the same ID for a symmetric target, and None for families that cannot be read in a
-    mirror.
-
-    Examples
-    --------
-    >>> mirrored_number('metashape12', 71)
-    12
-    """
-    from ahf_ros.codes import cyclic, ring
-
-    if name not in RING_NAMES:
-        return None
-    family = ring.family(name)
-    return family.number(cyclic.mirrored_words(code, family.bits))

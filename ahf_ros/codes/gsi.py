@@ -12,12 +12,12 @@ from dataclasses import dataclass
 from itertools import combinations
 from math import comb, dist
 from pathlib import Path
-from typing import ClassVar
 
 import numpy as np
 
 from ahf_ros.codes.data_file import Entry, read_data_file
 from ahf_ros.codes.kept import kept_while_unchanged
+from ahf_ros.codes.prints import Disc, Print, Proportions, Shape
 from ahf_ros.opening import reader
 
 GSI_LIBRARY = Path(__file__).with_name('gsi.json')
@@ -26,6 +26,7 @@ GSI_LIBRARY = Path(__file__).with_name('gsi.json')
 _POSITION_NUMBERS = (0, 31)  # a code of the messages has 32 bits
 _MAXIMUM_CODES = 200_000  # that a rule may be tried on
 _MAXIMUM_NUMBER = 2**31 - 1
+_MARGIN = 1.0  # of the quiet zone about the outermost dot, in radii of the dot
 
 Dot = tuple[float, float, float]
 """x, y and radius of a dot."""
@@ -48,7 +49,7 @@ class Rule:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class PointFamily:
+class PointFamily(Print):
     """The printed design and the codes of one family of point-distributed targets.
 
     Attributes
@@ -68,8 +69,6 @@ class PointFamily:
     words, numbers : ndarray of int64, shape (k,)
         The values of the codes, ascending and read-only, and the ID of each.
     """
-
-    kind: ClassVar[str] = 'gsi'
 
     name: str
     unit: str
@@ -100,6 +99,35 @@ class PointFamily:
                 f'{self.name}, from {self.numbers.min()} to {self.numbers.max()}'
             )
         return int(found[0])
+
+    @property
+    def all_ids(self) -> Sequence[int]:
+        """All IDs, ascending."""
+        ids: list[int] = sorted(self.numbers.tolist())
+        return ids
+
+    @property
+    def reading(self) -> dict[str, int | str]:
+        """How words are read."""
+        bits = int(self.position_numbers.max()) + 1
+        return {'bits': bits, 'first_bit': 'lowest', 'direction': 'by position'}
+
+    @property
+    def proportions(self) -> Proportions:
+        """What all targets have in common."""
+        reach = self.reach / self.dot_radius
+        return Proportions(
+            reach=reach,
+            radius=float(self.template_radii[self.reference] / self.dot_radius),
+            quiet_zone=reach + _MARGIN,
+            radii={'dot': 1.0},
+        )
+
+    def ink(self, word: int, pinhole: float = 0.0) -> tuple[Shape, ...]:
+        """Return the dots of a value."""
+        places, radii = self.dots(word)
+        dots = np.column_stack([radii, np.zeros_like(radii), places]) / self.dot_radius
+        return tuple(Disc(*dot) for dot in dots.tolist())
 
     def decoding_dots(self, word: int) -> np.ndarray:
         """Return the indices of the positions that have a dot, ndarray of int."""

@@ -22,6 +22,7 @@ import numpy as np
 from ahf_ros.codes import RING_FOLDER, RING_NAMES, VENDOR_NAMES
 from ahf_ros.codes.cyclic import CyclicFamily, mirrored_words, smallest_rotation
 from ahf_ros.codes.data_file import Entry, pinhole_in, read_data_file
+from ahf_ros.codes.prints import Disc, Proportions, Ring, Sectors, Shape
 from ahf_ros.opening import reader
 
 FAMILY_NAMES = VENDOR_NAMES
@@ -36,6 +37,8 @@ POLARITIES = 'dark', 'bright', 'both'
 Radii = tuple[float, float]
 
 _MAXIMUM_RADIUS = 12.0  # of bands and circles, dot radii
+_QUIET_ZONE = 4.2  # that of a band up to 3.5, dot radii
+_WIDER = 1.2  # quiet zone of larger targets, times their reach
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -48,7 +51,7 @@ class Family(CyclicFamily):
     rings of their colour, by their inner and outer radii.
     """
 
-    kind: ClassVar[str] = 'ring'
+    direction: ClassVar[str] = 'counter-clockwise'
 
     band_inner: float
     band_outer: float
@@ -66,6 +69,36 @@ class Family(CyclicFamily):
     def reach(self) -> float:
         """Radius of the circle that holds all ink."""
         return max(self.band_outer, *(outer for _, outer in self.circles), 0.0)
+
+    @property
+    def proportions(self) -> Proportions:
+        """What all targets have in common."""
+        radii = {'dot': 1.0, 'band_inner': self.band_inner, 'band_outer': self.band_outer}
+        for number, (inner, outer) in enumerate(self.circles, 1):
+            radii |= {f'circle_{number}_inner': inner, f'circle_{number}_outer': outer}
+        return Proportions(
+            reach=self.reach,
+            radius=1.0,
+            quiet_zone=max(_QUIET_ZONE, _WIDER * self.reach),
+            radii=radii,
+            pinhole=self.pinhole,
+            polarity='bright' if self.polarity == 'bright' else 'dark',
+        )
+
+    def ink(self, word: int, pinhole: float = 0.0) -> tuple[Shape, ...]:
+        """Return dot, band and further circles of a word."""
+        band = Sectors(*self.band, tuple(sectors(word, self.bits).tolist()))
+        return (Disc(1.0, pinhole), band, *(Ring(*ends) for ends in self.circles))
+
+    def mirrored(self, word: int) -> int | None:
+        """Return the ID that a word has in a mirror.
+
+        Examples
+        --------
+        >>> family('metashape12').mirrored(71)
+        12
+        """
+        return self.number(mirrored_words(word, self.bits))
 
     @property
     def has_all_words(self) -> bool:

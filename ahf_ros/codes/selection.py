@@ -11,12 +11,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ahf_ros.codes.cctag import CircleFamily
-from ahf_ros.codes.cyclic import CyclicFamily, mirrored_words, rotated_words
-from ahf_ros.codes.dots import DotFamily
-from ahf_ros.codes.families import code_family
-from ahf_ros.codes.gsi import PointFamily
-from ahf_ros.codes.square import SQUARE_NAMES, dictionary
+from ahf_ros.codes.cyclic import CyclicFamily, rotated_words
+from ahf_ros.codes.prints import Print
 
 _STARTS = 4
 _STEPS = 3000  # exchanges after each start
@@ -101,17 +97,17 @@ def _exchanged(
     return best
 
 
-def select_ids(name: str, ids: Sequence[int], count: int, file: str = '') -> list[int]:
+def select_ids(design: Print, ids: Sequence[int], count: int) -> list[int]:
     """Return `count` of different IDs of a family whose targets are hard to confuse, ascending.
 
     No two of their words turn into each other by a cover in one colour, and the smallest Hamming
     distance between any two, over all rotations, is as large as a search finds it. They are the
-    same ones in every run. `file` is the data file that describes the family, of `gsi` and `dots`;
-    the usual one where empty. Raise a ValueError if no set of so many is found.
+    same ones in every run. Raise a ValueError if no set of so many is found.
 
     Examples
     --------
-    >>> ids = select_ids('metashape14', range(1, 562), 20)
+    >>> from ahf_ros.codes.ring import family
+    >>> ids = select_ids(family('metashape14'), range(1, 562), 20)
     >>> len(ids)
     20
     """
@@ -119,8 +115,8 @@ def select_ids(name: str, ids: Sequence[int], count: int, file: str = '') -> lis
     pool = np.array(sorted(ids))
     if pool.size > MAXIMUM_WORDS:
         pool = np.sort(generator.choice(pool, MAXIMUM_WORDS, replace=False))
-    distances = _distances(_orbits(name, pool, file))
-    confused = _confused(name, pool, file)
+    distances = _distances(design.orbits(pool))
+    confused = _confused(design, pool)
     levels = np.unique(distances[np.triu_indices(pool.size, 1)])[::-1].tolist() or [0]
     largest = 0
     for level in levels:
@@ -132,25 +128,8 @@ def select_ids(name: str, ids: Sequence[int], count: int, file: str = '') -> lis
         largest = max(largest, found.size)
     raise ValueError(
         f'best is {count}, accepted is an integer from 1 to {largest}: no larger set of IDs of '
-        f'{name} was found in which no target turns into another one by a cover'
+        f'{design.name} was found in which no target turns into another one by a cover'
     )
-
-
-def _orbits(name: str, ids: np.ndarray, file: str) -> np.ndarray:
-    """Return all words that are the code of each ID, ndarray of uint64, shape (n, k)."""
-    if name in SQUARE_NAMES:
-        rotations = dictionary(name).bytesList[ids].transpose(0, 2, 1).astype(np.uint64)
-        places = np.uint64(8) * np.arange(rotations.shape[2], dtype=np.uint64)
-        orbits: np.ndarray = (rotations << places).sum(axis=2, dtype=np.uint64)
-        return orbits
-    code = code_family(name, file)
-    words = np.array([code.word(number) for number in ids.tolist()])
-    if isinstance(code, (PointFamily, CircleFamily)):
-        return words[:, None].astype(np.uint64)
-    turned = [rotated_words(words, turn, code.bits) for turn in range(code.bits)]
-    if isinstance(code, DotFamily):
-        turned += [mirrored_words(words, code.bits) for words in turned]
-    return np.stack(turned, axis=1).astype(np.uint64)
 
 
 def _distances(orbits: np.ndarray) -> np.ndarray:
@@ -165,24 +144,23 @@ def _distances(orbits: np.ndarray) -> np.ndarray:
     return distances
 
 
-def _confused(name: str, ids: np.ndarray, file: str) -> np.ndarray:
+def _confused(design: Print, ids: np.ndarray) -> np.ndarray:
     """Return which pairs of ascending IDs a cover turns into each other, bool, shape (n, n).
 
     An ID and itself may be such a pair.
     """
     confused = np.zeros((ids.size, ids.size), bool)
-    code = None if name in SQUARE_NAMES else code_family(name, file)
-    if not isinstance(code, CyclicFamily):
+    if not isinstance(design, CyclicFamily):
         return confused
-    words = code.words_of(ids)
-    every = code.canonical(np.arange(1 << code.bits))
+    words = design.words_of(ids)
+    every = design.canonical(np.arange(1 << design.bits))
     order = np.argsort(words)
     place = order[np.minimum(np.searchsorted(words, every, sorter=order), ids.size - 1)]
     index = np.where(words[place] == every, place, -1)
     rows = np.arange(ids.size)
-    for length in range(1, code.bits):
-        for turn in range(code.bits):
-            arc = int(rotated_words((1 << length) - 1, turn, code.bits))
+    for length in range(1, design.bits):
+        for turn in range(design.bits):
+            arc = int(rotated_words((1 << length) - 1, turn, design.bits))
             for covered in (words & ~arc, words | arc):
                 others = index[covered]
                 confused[rows[others >= 0], others[others >= 0]] = True

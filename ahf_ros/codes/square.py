@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import cache, lru_cache
 from typing import Any
 
@@ -9,8 +11,54 @@ import cv2
 import numpy as np
 
 from ahf_ros.codes import APRILTAG_NAMES, SQUARE_NAMES
+from ahf_ros.codes.prints import Cells, Print, Proportions, Shape
 
+HALF_SIDE = 2.4
+"""Half the side of a square marker, in radii of the dot of a ring target of the same size."""
+
+_QUIET_ZONE = 4.2  # as of ring targets, in these radii
 _PLAIN = 0.3  # share of the corners of cells; it is 0.5 of random cells
+
+
+@dataclass(frozen=True, slots=True)
+class CellPrint(Print):
+    """The print of the markers of a dictionary, one of `SQUARE_NAMES`.
+
+    What its words are read from raises a ValueError if this OpenCV does not have the dictionary.
+    """
+
+    name: str
+
+    @property
+    def all_ids(self) -> Sequence[int]:
+        """All IDs, ascending."""
+        return range(len(dictionary(self.name).bytesList))
+
+    def word(self, number: int) -> int:
+        """Return the code word of an ID, which is the same."""
+        return number
+
+    @property
+    def proportions(self) -> Proportions:
+        """What all markers have in common."""
+        return Proportions(
+            reach=HALF_SIDE * 2**0.5,
+            radius=HALF_SIDE,
+            quiet_zone=_QUIET_ZONE,
+            radii={'half_side': HALF_SIDE},
+        )
+
+    def ink(self, word: int, pinhole: float = 0.0) -> tuple[Shape, ...]:
+        """Return the cells of a marker with its border."""
+        rows = (marker(self.name, word, 1) == 0).tolist()
+        return (Cells(HALF_SIDE, tuple(map(tuple, rows))),)
+
+    def orbits(self, numbers: np.ndarray) -> np.ndarray:
+        """Return the words of the markers in all four rotations, shape (n, 4)."""
+        rotations = dictionary(self.name).bytesList[numbers].transpose(0, 2, 1).astype(np.uint64)
+        places = np.uint64(8) * np.arange(rotations.shape[2], dtype=np.uint64)
+        orbits: np.ndarray = (rotations << places).sum(axis=2, dtype=np.uint64)
+        return orbits
 
 
 def dictionary(name: str) -> Any:

@@ -14,14 +14,7 @@ from pkgutil import resolve_name
 from typing import TYPE_CHECKING, NamedTuple
 
 from ahf_ros.codes import SQUARE_NAMES
-from ahf_ros.codes.families import (
-    AUTO,
-    FAMILY_NAMES,
-    KINDS,
-    check_numbers,
-    families_in,
-    kind_of,
-)
+from ahf_ros.codes.families import AUTO, FAMILY_NAMES, KINDS, FamilyPrint, check_numbers
 from ahf_ros.deprecation import deprecated_arguments
 from ahf_ros.detectors.contract import (
     Contesting,
@@ -145,27 +138,27 @@ def create_detector(
     if not (settings is None or isinstance(settings, DetectorSettings)):
         raise ValueError(f'settings is {shown(settings)}, accepted is a DetectorSettings')
     settings = updated(settings or DetectorSettings(), options)
-    name = detector_name(name, settings.family, settings.family_file)
+    name = detector_name(name, settings)
     if name in _ADDED:
         return _added(_ADDED[name], settings)
     if name == _SEVERAL:
         return _several(settings)
-    families = _families(name, settings.family, settings.family_file)
-    if families != settings.families:
+    families = [it.name for it in _families(name, settings)]
+    if len(families) < len(settings.families):
         settings = settings.narrowed(families)
     made: Detector = resolve_name(f'ahf_ros.{_ENTRIES[name].detector}')(settings)
     return made
 
 
-def detector_name(name: str, family: str, files: str = '') -> str:
-    """Return the name of a detector that identifies a family or several, see `families_in`.
+def detector_name(name: str, settings: DetectorSettings) -> str:
+    """Return the name of a detector that identifies the families of settings.
 
     It is 'several' where each family has its own, and raises a ValueError if there is no such
     detector, or it does not identify these families.
     """
     DETECTOR.check(name)
-    families = _families(name, family, files)
-    kinds = {kind_of(of, files) for of in families}
+    families = _families(name, settings)
+    kinds = {of.kind for of in families}
     fitting = [
         fit
         for fit, entry in _ENTRIES.items()
@@ -176,22 +169,22 @@ def detector_name(name: str, family: str, files: str = '') -> str:
     if name in _ENTRIES and name not in fitting:
         several = ', alone or together' if _ENTRIES[name].several else ''
         raise ValueError(
-            f'detector is {name!r} and family is {family!r}; accepted with this family is one of '
-            f'{", ".join((_AUTO, *fitting, *_ADDED))}, and with this detector one of '
+            f'detector is {name!r} and family is {settings.family!r}; accepted with this family '
+            f'is one of {", ".join((_AUTO, *fitting, *_ADDED))}, and with this detector one of '
             f'{", ".join(of for kind in _ENTRIES[name].kinds for of in KINDS[kind])}{several}'
         )
     return name
 
 
-def _families(name: str, family: str, files: str) -> tuple[str, ...]:
-    """Return the families that a text names; of all, those that a detector reads.
+def _families(name: str, settings: DetectorSettings) -> tuple[FamilyPrint, ...]:
+    """Return the families of settings; of all, those that a detector reads.
 
     A detector that reads one at a time reads the first.
     """
-    families = families_in(family, files)
-    if family != AUTO or name not in _ENTRIES:
+    families = tuple(settings.prints.values())
+    if settings.family != AUTO or name not in _ENTRIES:
         return families
-    own = tuple(of for of in families if kind_of(of, files) in _ENTRIES[name].kinds)
+    own = tuple(of for of in families if of.kind in _ENTRIES[name].kinds)
     return own if _ENTRIES[name].several else own[:1]
 
 
@@ -204,10 +197,10 @@ def _several(settings: DetectorSettings) -> Detector:
     from ahf_ros.detectors.several import SeveralDetector
 
     groups: dict[str, list[str]] = {}
-    for family in settings.families:
+    for family, of in settings.prints.items():
         if settings.family == AUTO and family in SQUARE_NAMES and not has_dictionary(family):
             continue
-        entry = _ENTRIES[detector_name(_AUTO, family, settings.family_file)]
+        entry = next(it for it in _ENTRIES.values() if of.kind in it.kinds)
         groups.setdefault(entry.detector if entry.several else family, []).append(family)
     parts = tuple(create_detector(settings=settings.narrowed(of)) for of in groups.values())
     return SeveralDetector(
@@ -231,7 +224,7 @@ def check_listed_ids(
     Detectors that are no part of this package, also as a command, may report any.
     """
     if name in (_SEVERAL, *_ENTRIES) and name != 'command':
-        check_numbers(field, ids, settings.families, settings.family_file)
+        check_numbers(field, ids, settings.prints.values())
 
 
 def estimator(settings: DetectorSettings) -> Callable[[np.ndarray], int]:
@@ -239,8 +232,8 @@ def estimator(settings: DetectorSettings) -> Callable[[np.ndarray], int]:
 
     It raises a ValueError if there are families whose targets cannot be counted.
     """
-    rings = _families('ring', settings.family, settings.family_file)
-    if any(kind_of(name, settings.family_file) != 'ring' for name in rings):
+    rings = _families('ring', settings)
+    if any(of.kind != 'ring' for of in rings):
         raise ValueError(
             f'estimate_expected is True and family is {settings.family!r}; accepted with this '
             f'family is False, and True with one of {", ".join(KINDS["ring"])}'
@@ -249,7 +242,7 @@ def estimator(settings: DetectorSettings) -> Callable[[np.ndarray], int]:
     def count(image: np.ndarray) -> int:
         from ahf_ros.detectors.ring.counting import estimate_count
 
-        return estimate_count(image, settings.narrowed(rings))
+        return estimate_count(image, settings.narrowed(of.name for of in rings))
 
     return count
 

@@ -4,25 +4,21 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, ClassVar, Protocol, runtime_checkable
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol, TypeVar, runtime_checkable
 
-from ahf_ros.codes.families import (
-    ACCEPTED,
-    AUTO,
-    Code,
-    colours_of,
-    families_in,
-    family_of,
-    kind_of,
-)
+from ahf_ros.codes.families import ACCEPTED, AUTO, FamilyPrint, prints_in
 from ahf_ros.settings.parameter import check_parameters, parameter
 from ahf_ros.target import Target
 
 if TYPE_CHECKING:
     import numpy as np
 
+    from ahf_ros.codes.prints import Print
     from ahf_ros.features.pyramid import ImagePyramid
+
+Code = TypeVar('Code', bound='Print')
+"""The prints of one kind."""
 
 _MINIMUM_RADIUS = 4.0  # of a dot, px, where the user sets none
 _MINIMUM_RADII = {'gsi': 2.0, 'dots': 2.5}  # of kinds whose dot is small beside the target
@@ -199,8 +195,10 @@ class DetectorSettings:
         One of `ahf_ros.codes.families.FAMILY_NAMES`, several separated by commas, or 'auto' for
         all; `families` has them one by one.
     family_file : str
-        Paths of data files, separated by commas, that describe more families, or `gsi` or `dots`
-        in the place of the usual design.
+        Paths of data files, separated by commas, that describe more families, or the design in
+        the place of that of `gsi` or `dots`, which is then called as the file says.
+    prints : dict of str to FamilyPrint
+        The families by their names, as the files described them when the settings were made.
     polarity : str
         Colour of the dot against its surroundings, 'dark', 'bright', or 'auto' for that of
         the families.
@@ -264,11 +262,13 @@ class DetectorSettings:
         minimum=0.01,
         maximum=86400.0,
     )
+    prints: dict[str, FamilyPrint] = field(init=False, repr=False, hash=False)
 
     def __post_init__(self) -> None:
         """Refuse values that are not accepted."""
         check_parameters(self)
-        names = ','.join(families_in(self.family, self.family_file))
+        object.__setattr__(self, 'prints', prints_in(self.family, self.family_file))
+        names = ','.join(self.prints)
         if self.family != AUTO and names != self.family.replace(' ', ''):
             object.__setattr__(self, 'family', names)  # as these families are written here
         minimum, maximum = self.radii
@@ -281,17 +281,20 @@ class DetectorSettings:
     @property
     def families(self) -> tuple[str, ...]:
         """The families that `family` names."""
-        return families_in(self.family, self.family_file)
+        return tuple(self.prints)
 
     def codes(self, kind: type[Code]) -> tuple[Code, ...]:
-        """Return the codes of the families, all of one kind; raise a ValueError otherwise."""
-        return family_of(kind, self.families, self.family_file)
+        """Return the prints of the families, all of one kind; raise a ValueError otherwise."""
+        designs = [it.design for it in self.prints.values()]
+        found = tuple(design for design in designs if isinstance(design, kind))
+        if len(found) < len(designs):
+            raise ValueError(f'family is {self.family!r}, accepted are other families')
+        return found
 
     @property
     def radii(self) -> tuple[float, float]:
         """Bounds of the semi-major axis of the dot, px, where kinds have their own minimum."""
-        kinds = {kind_of(name, self.family_file) for name in self.families}
-        smallest = min(_MINIMUM_RADII.get(kind, _MINIMUM_RADIUS) for kind in kinds)
+        smallest = min(_MINIMUM_RADII.get(it.kind, _MINIMUM_RADIUS) for it in self.prints.values())
         return self.min_radius or smallest, self.max_radius
 
     def of_size(self, radii: np.ndarray) -> np.ndarray:
@@ -310,7 +313,8 @@ class DetectorSettings:
         """1 where dots may be dark, -1 where they may be bright."""
         if self.polarity != 'auto':
             return _SIGNS[self.polarity]
-        return _SIGNS[colours_of(self.families, self.family_file)]
+        colours = {it.design.polarity for it in self.prints.values()}
+        return _SIGNS[colours.pop() if len(colours) == 1 else 'both']
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,21 +7,22 @@ from math import hypot
 
 import numpy as np
 
-from ahf_ros.codes.designs import relative_reach
 from ahf_ros.features.frame import affine_frames
-from ahf_ros.target import DottedTarget, Target
+from ahf_ros.target import DottedTarget, Prints, Target, reach_of
 
 _MARGIN = 1.15  # times the reach of a target, within which the blur of its edges is
 _ANGLES = 64  # in which the surroundings of a target are looked at
 
 
-def without_targets(image: np.ndarray, targets: Iterable[Target]) -> np.ndarray:
+def without_targets(image: np.ndarray, targets: Iterable[Target], prints: Prints) -> np.ndarray:
     """Return an image in which targets are painted over with the light about them.
 
     Parameters
     ----------
     image : ndarray, shape (height, width)
     targets : iterable of Target
+    prints : mapping of str to FamilyRecord
+        Their families by name; a target of another one ends with its ellipse.
 
     Returns
     -------
@@ -35,13 +36,14 @@ def without_targets(image: np.ndarray, targets: Iterable[Target]) -> np.ndarray:
     >>> from ahf_ros import SceneSettings, identify, render
     >>> image = render(SceneSettings(width=320, height=240, targets=3, dot_radius=8)).image
     >>> found = identify(image, family='metashape12')
-    >>> len(found), len(identify(without_targets(image, found), family='metashape12'))
+    >>> left = without_targets(image, found, found.prints)
+    >>> len(found), len(identify(left, family='metashape12'))
     (3, 0)
     """
     left = image.copy()
     height, width = image.shape
     angles = np.arange(_ANGLES) * 2 * np.pi / _ANGLES
-    ellipses = np.array([(it.x, it.y, *_reach(it)) for it in targets]).reshape(-1, 5)
+    ellipses = np.array([(it.x, it.y, *_reach(it, prints)) for it in targets]).reshape(-1, 5)
     frames = affine_frames(*ellipses.T)
     circle = np.stack([np.cos(angles), np.sin(angles), np.ones(_ANGLES)])
     rims = np.rint((frames @ circle)[:, :2]).astype(int)
@@ -67,9 +69,9 @@ def without_targets(image: np.ndarray, targets: Iterable[Target]) -> np.ndarray:
     return left
 
 
-def _reach(target: Target) -> tuple[float, float, float]:
+def _reach(target: Target, prints: Prints) -> tuple[float, float, float]:
     """Return semi-axes, px, and direction, rad, of an ellipse that holds a target."""
-    times = relative_reach(target.family)
+    times = reach_of(target, prints)
     if isinstance(target, DottedTarget) and target.dots:
         away = max(hypot(x - target.x, y - target.y) + size for x, y, size, *_ in target.dots)
         return _MARGIN * away, _MARGIN * away, 0.0

@@ -16,7 +16,6 @@ from typing import ClassVar
 
 import numpy as np
 
-from ahf_ros.codes.designs import relative_reach
 from ahf_ros.codes.families import AUTO
 from ahf_ros.detectors.claims import owners
 from ahf_ros.detectors.contract import (
@@ -35,7 +34,7 @@ from ahf_ros.detectors.explained import without_targets
 from ahf_ros.features.common_search import CommonSearch
 from ahf_ros.features.pyramid import ImagePyramid, image_pyramid
 from ahf_ros.imaging.image import as_gray, check_image
-from ahf_ros.target import UNDECODED, DottedTarget, Target, sorted_targets
+from ahf_ros.target import UNDECODED, DottedTarget, Prints, Target, reach_of, sorted_targets
 
 _DIGITS = 2  # of a confidence, beyond which one is not surer than another
 
@@ -136,8 +135,8 @@ class SeveralDetector:
             results.append(found)
             if self.family == AUTO and is_clear(found):
                 known = [it for it in found if it.id != UNDECODED]
-                left, pyramid = without_targets(left, known), None
-                dots = dots if dots is None else _beside(dots, known)
+                left, pyramid = without_targets(left, known, self.settings.prints), None
+                dots = dots if dots is None else _beside(dots, known, self.settings.prints)
         return results
 
     def _pyramid(self, image: np.ndarray, contrast: int) -> ImagePyramid:
@@ -155,7 +154,7 @@ class SeveralDetector:
             for number, found in enumerate(results)
             for target in self._named(self.of_parts[number], found)
         ]
-        radii = [_radius(target) for _, target in named]
+        radii = [_radius(target, self.settings.prints) for _, target in named]
         order = sorted(
             range(len(named)),
             key=lambda it: (
@@ -184,17 +183,17 @@ class SeveralDetector:
             yield target if known else replace(target, family=families[0])
 
 
-def _beside(dots: np.ndarray, targets: Sequence[Target]) -> np.ndarray:
+def _beside(dots: np.ndarray, targets: Sequence[Target], prints: Prints) -> np.ndarray:
     """Return the frames of dots, shape (k, 3, 3), whose centres are on none of some targets."""
-    x, y, reach = np.array([(it.x, it.y, _radius(it)) for it in targets]).T
+    x, y, reach = np.array([(it.x, it.y, _radius(it, prints)) for it in targets]).T
     away = np.hypot(dots[:, :1, 2] - x, dots[:, 1, 2, None] - y)
     beside: np.ndarray = dots[(away >= reach).all(axis=1)]
     return beside
 
 
-def _radius(target: Target) -> float:
+def _radius(target: Target, prints: Prints) -> float:
     """Return the radius of the narrowest circle about a target's centre that ends with it."""
     if isinstance(target, DottedTarget) and target.dots:
         reach = max(hypot(x - target.x, y - target.y) for x, y, *_ in target.dots)
         return reach * target.semi_minor / target.semi_major
-    return relative_reach(target.family) * target.semi_minor
+    return reach_of(target, prints) * target.semi_minor

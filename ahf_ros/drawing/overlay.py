@@ -13,16 +13,17 @@ from dataclasses import dataclass, field
 import cv2
 import numpy as np
 
-from ahf_ros.codes.designs import relative_reach
 from ahf_ros.doubt import DOUBTFUL_BELOW
 from ahf_ros.imaging.image import stretched_to_8_bit
 from ahf_ros.target import (
     UNDECODED,
     DottedTarget,
     Identification,
+    Prints,
     SquareMarker,
     Target,
     UndecodedTarget,
+    reach_of,
 )
 
 Colour = tuple[int, int, int]
@@ -156,7 +157,12 @@ def draw(image: np.ndarray, identification: Identification) -> np.ndarray:
     >>> draw(np.full((60, 80), 128, np.uint8), Identification(())).shape
     (60, 80, 3)
     """
-    return overlay(image, identification.targets, title=summary(identification))
+    return overlay(
+        image,
+        identification.targets,
+        title=summary(identification),
+        prints=identification.prints,
+    )
 
 
 def overlay(
@@ -166,12 +172,14 @@ def overlay(
     missed: Collection[Target] = (),
     unit: int | None = None,
     title: str = '',
+    prints: Prints | None = None,
 ) -> np.ndarray:
     """Return an image in colour with the dot, the centre and the ID of every target, as `draw`.
 
     Decoded targets have a solid outline. Doubtful ones have a dashed one, and their ID has a
     question mark. `wrong` are those of `targets` that are known to be wrong; `missed` ones are
-    crossed out. The family is beside the ID if there are targets of several families.
+    crossed out. The family is beside the ID if there are targets of several families. `prints` are
+    families by name, as far as they are known: labels are beside all of a print.
 
     Lines are `unit` px wide. By default that grows with the image, so that lines and letters are
     legible when all of the image is on a screen.
@@ -194,7 +202,7 @@ def overlay(
                     text=f'{text} {target.family}' if several and target.id != UNDECODED else text,
                     x=target.x,
                     y=target.y,
-                    radius=_radius(target),
+                    radius=_radius(target, prints or {}),
                     colour=colour,
                     outline=_outline(target),
                 )
@@ -238,11 +246,11 @@ def _look(target: Target, wrong: bool) -> tuple[Colour, str]:
     return DECODED_COLOUR, str(target.id)
 
 
-def _radius(target: Target) -> float:
+def _radius(target: Target, prints: Prints) -> float:
     """Return the radius of a circle that holds a target, px."""
     if isinstance(target, DottedTarget) and target.dots:
         return max(math.hypot(x - target.x, y - target.y) + a for x, y, a, _, _ in target.dots)
-    return relative_reach(target.family) * target.semi_major
+    return reach_of(target, prints) * target.semi_major
 
 
 def _outline(target: Target) -> np.ndarray:

@@ -38,6 +38,7 @@ from ahf_ros.target import (
     UNDECODED,
     FilterState,
     Identification,
+    Prints,
     SearchTrace,
     Target,
     UndecodedTarget,
@@ -138,6 +139,8 @@ class Identifier:
         What errors call the detector.
     looked_for : str
         The families that the detector looks for, as the results name them.
+    prints : mapping of str to FamilyRecord, optional
+        Families that targets may be of, by their names, for the results.
     clock : callable, optional
         Time in s.
 
@@ -172,6 +175,7 @@ class Identifier:
         mirrored: MirroredId | None = None,
         name: str = 'detector',
         looked_for: str = '',
+        prints: Prints | None = None,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self.last_search: SearchResult | None = None
@@ -192,6 +196,7 @@ class Identifier:
         self._clock = clock
         self._contested = contested
         self._mirrored = mirrored
+        self._prints = prints or {}
         self._name = name
         self._looked_for = looked_for
 
@@ -310,6 +315,7 @@ class Identifier:
             other_ids=trials.left_out(choice.filter),
             repeated=repeated,
             looked_for=self._looked_for,
+            prints=self._prints,
         )
 
     def _trials(self, stack: ImageStack) -> Trials:

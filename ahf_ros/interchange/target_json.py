@@ -8,7 +8,6 @@ from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any
 
-from ahf_ros.codes.families import code_reading
 from ahf_ros.doubt import doubt
 from ahf_ros.interchange.files import RESULTS_FILE, checked_file_name
 from ahf_ros.opening import Most, parsed_json, read_text, reader
@@ -42,7 +41,6 @@ def to_json(
     split: str = '',
     upright: bool = False,
     mapping: Mapping[str, float] | None = None,
-    family_file: str = '',
 ) -> dict[str, Any]:
     """Return the JSON object of an identification.
 
@@ -51,17 +49,15 @@ def to_json(
     are identified together, `stack` holds their paths, `image` is the first, and `split` says why
     a stack was split before it. `upright` says whether images were turned as their orientation
     says. `mapping` holds the other settings of the filter, see
-    `ahf_ros.filtering.homomorphic.FilterSettings`. `family_file` has the data files of families.
+    `ahf_ros.filtering.homomorphic.FilterSettings`.
     """
     height, width = shape
     used = asdict(identification.filter) | dict(mapping or {})
     elapsed = used.pop('duration')
     targets = identification.targets
-    readings = {
-        name: reading
-        for name in dict.fromkeys(target.family for target in targets)
-        if (reading := code_reading(name, family_file))
-    }
+    families = dict.fromkeys(target.family for target in targets)
+    prints = [identification.prints[it] for it in families if it in identification.prints]
+    readings = {it.name: dict(it.reading) for it in prints if it.reading}
     several = {}
     if stack:
         several = {
@@ -84,6 +80,7 @@ def to_json(
         'mirrored': identification.mirrored,
         'edge_shift': identification.edge_shift,
         'codes': readings,
+        'reach': {it.name: round(it.reach, 4) for it in prints},
         'targets': [
             asdict(target) | _remarks(target, readings.get(target.family), detector)
             for target in targets

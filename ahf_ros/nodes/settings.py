@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from importlib.util import find_spec
 
 from ahf_ros.cloud_settings import MAXIMUM_TOLERANCE, CloudSettings
-from ahf_ros.codes.families import families_of
+from ahf_ros.codes.families import prints_of
 from ahf_ros.detectors import DETECTOR, detector_name
 from ahf_ros.extras import missing
 from ahf_ros.nodes.patience import CONTINUOUS, TRIGGERED, UNKNOWN
@@ -178,7 +178,7 @@ class DetectorNodeSettings:
         of = self.identification
         detector = self.service
         if of.detector != SERVICE:
-            detector = detector_name(of.detector, of.detection.family, of.detection.family_file)
+            detector = detector_name(of.detector, of.detection)
         number = str(of.number)
         if not of.number:
             number = 'estimated' if of.estimate_expected else NUMBER_UNKNOWN
@@ -194,18 +194,13 @@ class DetectorNodeSettings:
         if self.autostart and not self.managed:
             yield 'autostart has no effect: managed is False'
         detection = self.identification.detection
-        if not detection.family_file:
+        if not detection.family_file or any(of.file for of in detection.prints.values()):
             return
         none = f'family_file has no effect: family is {detection.family}'
         try:
-            described = families_of(detection.family_file)
+            yield f'{none}, and the file describes {", ".join(prints_of(detection.family_file))}'
         except ValueError as error:  # nobody has read it
             yield f'{none}; {printable(str(error))}'
-            return
-        # A file takes the place of a usual design of its kind, which is named by that.
-        names = {name for code in described.values() for name in (code.name, code.kind)}
-        if not names & set(detection.families):
-            yield f'{none}, and the file describes {", ".join(described)}'
 
     def __post_init__(self) -> None:
         """Refuse values that are not accepted."""

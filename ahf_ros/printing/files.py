@@ -11,7 +11,6 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from ahf_ros.codes import CCTAG_NAMES, SQUARE_NAMES
 from ahf_ros.codes.designs import Arc
 from ahf_ros.extras import need
 from ahf_ros.printing.drawing import Drawing, Ink
@@ -50,7 +49,7 @@ def geometry_text(sheets: Sheets) -> str:
     settings, paper = sheets.settings, sheets.settings.paper
     common = settings.proportions
     radii = {name: settings.radius * length for name, length in common.radii.items()}
-    if settings.hole and settings.family not in ('gsi', *SQUARE_NAMES, *CCTAG_NAMES):
+    if settings.hole and settings.print.design.has_pinhole:
         radii['pinhole'] = settings.radius * settings.hole
     radii['quiet_zone'] = settings.radius * common.quiet_zone
     geometry = {

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
-from ahf_ros.codes.designs import HALF_SIDE, Proportions, proportions
-from ahf_ros.codes.families import ONE, check_numbers, family_in, numbers_of
+from ahf_ros.codes.families import ONE, FamilyPrint, check_numbers, print_in
+from ahf_ros.codes.prints import Proportions
 from ahf_ros.codes.selection import select_ids
-from ahf_ros.codes.square import SQUARE_NAMES
+from ahf_ros.codes.square import HALF_SIDE, SQUARE_NAMES
 from ahf_ros.printing.paper import LABEL_SHEETS, Page, length_in, page_in
 from ahf_ros.settings.parameter import check_parameters, numbers_in, parameter
 
@@ -64,12 +64,14 @@ class SheetSettings:
     per_page: int = parameter(
         0, 'Maximum number of targets on a page; 0: as many as there is room for.', minimum=0
     )
+    print: FamilyPrint = field(init=False, repr=False, hash=False)
 
     def __post_init__(self) -> None:
         """Check each parameter, and that they fit each other."""
         check_parameters(self)
-        object.__setattr__(self, 'family', family_in(self.family, self.family_file))
-        check_numbers('ids', numbers_in('ids', self.ids), (self.family,), self.family_file)
+        object.__setattr__(self, 'print', print_in(self.family, self.family_file))
+        object.__setattr__(self, 'family', self.print.name)
+        check_numbers('ids', numbers_in('ids', self.ids), [self.print])
         square = self.family in SQUARE_NAMES
         if square and self.colour != 'dark':
             raise ValueError(
@@ -92,7 +94,7 @@ class SheetSettings:
     def numbers(self) -> list[int]:
         """IDs of the targets, ascending; a ValueError if so many as `best` are not found."""
         given = numbers_in('ids', self.ids)
-        every = sorted(given) if given else list(numbers_of(self.family, self.family_file))
+        every = sorted(given) if given else list(self.print.design.all_ids)
         if not self.best:
             return every
         if self.best > len(every):
@@ -100,7 +102,7 @@ class SheetSettings:
                 f'best is {self.best}, accepted is an integer from 1 to {len(every)}, the number '
                 'of IDs to select from'
             )
-        return select_ids(self.family, every, self.best, self.family_file)
+        return select_ids(self.print.design, every, self.best)
 
     @property
     def radius(self) -> float:
@@ -127,7 +129,7 @@ class SheetSettings:
     @property
     def proportions(self) -> Proportions:
         """What all targets have in common, in radii of the dot."""
-        return proportions(self.family, self.family_file).chosen(self.polarity, self.pinhole)
+        return self.print.design.proportions.chosen(self.polarity, self.pinhole)
 
     @property
     def colour(self) -> str:

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
-from ahf_ros.codes.designs import circle, printed_design
+from ahf_ros.codes.designs import circle, contours
 from ahf_ros.printing.drawing import Drawing, Ink, Line, Text, text_width
 from ahf_ros.printing.paper import LABEL_SHEETS
 from ahf_ros.printing.settings import SheetSettings
@@ -198,7 +198,7 @@ class Sheets:
         settings = self.settings
         for index, number in enumerate(self.numbers):
             page, place = divmod(index, len(self.layout.places))
-            code = printed_design(settings.family, number, 0.0, settings.family_file).code
+            code = settings.print.design.word(number)
             yield Placed(number, code, page + 1, *self.layout.places[place])
 
     def pages(self) -> Iterator[Drawing]:
@@ -224,12 +224,12 @@ class Sheets:
 
     def _ink(self, number: int, x: float, y: float) -> Ink:
         settings = self.settings
-        design = printed_design(settings.family, number, settings.hole, settings.family_file)
-        contours = design.contours
+        design = settings.print.design
+        outlines = contours(design.ink(design.word(number), settings.hole))
         if settings.colour == 'bright':
-            contours = (circle(settings.proportions.quiet_zone), *contours)
+            outlines = (circle(settings.proportions.quiet_zone), *outlines)
         return Ink(
-            name=f'{settings.family} {number}', x=x, y=y, scale=settings.radius, contours=contours
+            name=f'{settings.family} {number}', x=x, y=y, scale=settings.radius, contours=outlines
         )
 
     def _bars(self) -> tuple[list[Line], list[Text]]:

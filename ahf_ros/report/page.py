@@ -18,7 +18,7 @@ from typing import Any
 import cv2
 
 from ahf_ros.advice import LOOKED_AT, advice
-from ahf_ros.codes.designs import relative_reach
+from ahf_ros.codes.families import AUTO, prints_in
 from ahf_ros.detectors.contract import DetectorSettings
 from ahf_ros.doubt import DOUBTFUL_BELOW, doubt
 from ahf_ros.edge_shift import edge_shift_remark
@@ -138,6 +138,13 @@ def families_of(results: Sequence[ImageResult]) -> list[str]:
     return [name for name, _ in counts.most_common() if name]
 
 
+def _reach(name: str, results: Sequence[ImageResult]) -> float:
+    """Return the radius of the targets of a family, in semi-axes of their ellipses."""
+    usual = prints_in(AUTO).get(name)  # other programs do not say it
+    told = (result.reach[name] for result in results if name in result.reach)
+    return next(told, round(usual.reach, 4) if usual else 1.0)
+
+
 def _known_ids(result: ImageResult, truth: Sequence[TrueTarget] | None) -> frozenset[int] | None:
     """Return the IDs that the image is known to show, None if only their number is known."""
     if truth is not None:
@@ -245,7 +252,7 @@ def write_page(
         rows.append(script_json(row(result, families, settings.doubtful_below, shown, advised)))
     about = {
         'families': families,
-        'reach': [round(relative_reach(name), 4) for name in families],
+        'reach': [_reach(name, results) for name in families],
         'doubtfulBelow': settings.doubtful_below,
         'maxSize': settings.max_size,
     }

@@ -50,6 +50,7 @@ class ImageResult:
     search: SearchTrace | None = None
     images: tuple[str, ...] = ()
     combination: str = ''
+    reach: dict[str, float] = field(default_factory=dict)
 
     @property
     def identified(self) -> frozenset[int]:
@@ -71,7 +72,7 @@ def result_from_json(content: Any, source: Path, where: str) -> ImageResult:
     targets = tuple(targets_from_json(content, where))
     record = _Record(content, where)
     used = record.object('filter')
-    search = record.object('search')
+    search, reach = record.object('search'), record.object('reach')
     return ImageResult(
         image=record.text('image', required=True),
         source=source,
@@ -100,6 +101,7 @@ def result_from_json(content: Any, source: Path, where: str) -> ImageResult:
         search=_search(search) if search.content else None,
         images=record.texts('images'),
         combination=record.text('combination'),
+        reach={name: reach.number(name) for name in reach.content},
     )
 
 

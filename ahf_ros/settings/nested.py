@@ -65,6 +65,5 @@ def _assembled(settings: type[Settings], values: Mapping[str, Any]) -> Settings:
 def _parts(settings: type) -> dict[str, type]:
     """Return the types of the nested settings, by the name of their field."""
     hints = get_type_hints(settings)
-    return {
-        item.name: hints[item.name] for item in fields(settings) if is_dataclass(hints[item.name])
-    }
+    given = [item.name for item in fields(settings) if item.init]
+    return {name: hints[name] for name in given if is_dataclass(hints[name])}

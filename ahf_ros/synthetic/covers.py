@@ -10,13 +10,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from ahf_ros.codes.cctag import CircleFamily
-from ahf_ros.codes.designs import HALF_SIDE, proportions
-from ahf_ros.codes.dots import DotFamily
-from ahf_ros.codes.families import code_family
-from ahf_ros.codes.gsi import PointFamily
-from ahf_ros.codes.ring import Family, sectors
-from ahf_ros.codes.square import SQUARE_NAMES, marker
+from ahf_ros.codes.prints import Cells, Disc, Print, Ring, Sectors, Shape
 
 _CELL = 32  # side of a cell in the picture of a square marker, px
 _SIDE = 256  # px of the picture of a distractor, finer than any in an image
@@ -44,10 +38,8 @@ class Design:
     radius: float
 
 
-def design(
-    name: str, number: int, turn: float, growth: float, pinhole: float, file: str = ''
-) -> Design:
-    """Return the design of a target of a family, or of the family that a data file describes.
+def design(printed: Print, number: int, turn: float, growth: float, pinhole: float) -> Design:
+    """Return the design of a target of a family.
 
     Parameters
     ----------
@@ -60,55 +52,84 @@ def design(
         Radius of the hole in the centre of the dot, in radii of the dot; 0 for none. Square
         markers, point-distributed targets and CCTags have none.
     """
-    if name in SQUARE_NAMES:
-        word, cover = number, square_cover(name, number, HALF_SIDE, turn, growth)
-    else:
-        code = code_family(name, file)
-        word = code.word(number)
-        if isinstance(code, PointFamily):
-            cover = _point_cover(code, word, turn, growth)
-        elif isinstance(code, CircleFamily):
-            cover = _circles_cover(code, word, growth)
-        elif isinstance(code, DotFamily):
-            cover = _dot_ring_cover(code, word, turn, pinhole, growth)
-        else:
-            cover = ring_cover(code, word, turn, pinhole, growth)
-    common = proportions(name, file)
-    return Design(
-        code=word, cover=cover, reach=common.reach + max(growth, 0.0), radius=common.radius
-    )
+    word, common = printed.word(number), printed.proportions
+    cover = ink_cover(printed.ink(word, pinhole), turn, growth)
+    return Design(word, cover, common.reach + max(growth, 0.0), common.radius)
 
 
-def ring_cover(
-    family: Family, word: int, turn: float, pinhole: float, growth: float = 0.0
-) -> Cover:
-    """Return the ink of a ring target whose sector 0 begins at `turn`, as for `design`.
+def ink_cover(ink: Sequence[Shape], turn: float, growth: float = 0.0) -> Cover:
+    """Return the ink of shapes that are turned and have grown, as for `design`.
 
     The signed distance to each edge, in widths of an anti-aliased edge, gives the covered
     fraction of a sample.
     """
-    inner, outer = np.float32(family.band_inner - growth), np.float32(family.band_outer + growth)
+    cells = [shape for shape in ink if isinstance(shape, Cells)]
+    if cells:
+        return _cells_cover(cells[0], turn, growth)
+    middle = [shape for shape in ink if not isinstance(shape, Disc) or shape.x == shape.y == 0]
+    dots = [shape for shape in ink if isinstance(shape, Disc) and shape not in middle]
+    cosine, sine = math.cos(turn), math.sin(turn)
+    places = np.array([(dot.x, dot.y) for dot in dots]).reshape(-1, 2)
+    places = places @ np.array([[cosine, sine], [-sine, cosine]])
 
     def cover(x: np.ndarray, y: np.ndarray, jacobian: np.ndarray) -> np.ndarray:
-        distance = np.sqrt(x * x + y * y)
-        radial = _edge_width(jacobian, x, y, distance)
-        inked = _dot_share(distance, radial, pinhole, growth)
-        for low, high in family.circles:
-            inked += _inside_share(distance - np.float32(low - growth), radial) * _inside_share(
-                np.float32(high + growth) - distance, radial
-            )
-        margin = np.float32(2 * radial.max())
-        band = (distance > inner - margin) & (distance < outer + margin)
-        distance, radial, x, y = distance[band], radial[band], x[band], y[band]
-        ring = _inside_share(distance - inner, radial)
-        ring *= _inside_share(outer - distance, radial)
-        around = _edge_width(jacobian, -y, x, distance) / distance
-        angle, wider = np.arctan2(y, x) - turn, np.float32(growth) / distance
-        ring *= _sector_cover(sectors(word, family.bits), angle, around, wider)
-        inked[band] += ring
-        return inked
+        inked = np.zeros_like(x)
+        if middle:
+            distance = np.sqrt(x * x + y * y)
+            width = _edge_width(jacobian, x, y, distance)
+        for shape in middle:
+            if isinstance(shape, Sectors):
+                _add_band(inked, shape, x, y, distance, width, jacobian, turn, growth)
+            elif isinstance(shape, Ring):
+                share = _inside_share(distance - np.float32(shape.inner - growth), width)
+                inked += share * _inside_share(np.float32(shape.outer + growth) - distance, width)
+            elif isinstance(shape, Disc):
+                inked += _disc_share(shape, distance, width, growth)
+        for dot, place in zip(dots, places, strict=True):
+            across, up = x - np.float32(place[0]), y - np.float32(place[1])
+            size = dot.radius + growth + 2 * np.abs(jacobian).sum()
+            near = np.maximum(np.abs(across), np.abs(up)) < size
+            across, up = across[near], up[near]
+            away = np.sqrt(across * across + up * up)
+            inked[near] += _disc_share(dot, away, _edge_width(jacobian, across, up, away), growth)
+        return np.minimum(inked, 1, out=inked)
 
     return cover
+
+
+def _add_band(
+    inked: np.ndarray,
+    band: Sectors,
+    x: np.ndarray,
+    y: np.ndarray,
+    distance: np.ndarray,
+    width: np.ndarray,
+    jacobian: np.ndarray,
+    turn: float,
+    growth: float,
+) -> None:
+    """Add the ink of a band to samples, in place; distance and width are those of its edges."""
+    inner, outer = np.float32(band.inner - growth), np.float32(band.outer + growth)
+    margin = np.float32(2 * width.max())
+    near = (distance > inner - margin) & (distance < outer + margin)
+    distance, width, x, y = distance[near], width[near], x[near], y[near]
+    ring = _inside_share(distance - inner, width)
+    ring *= _inside_share(outer - distance, width)
+    around = _edge_width(jacobian, -y, x, distance) / distance
+    angle, wider = np.arctan2(y, x) - turn, np.float32(growth) / distance
+    ring *= _sector_cover(np.array(band.inked), angle, around, wider)
+    inked[near] += ring
+
+
+def _disc_share(disc: Disc, distance: np.ndarray, width: np.ndarray, growth: float) -> np.ndarray:
+    """Return the fraction of each sample that a disc covers, without its hole.
+
+    `distance` is that from its centre, `width` that of its edge, float32.
+    """
+    share = _inside_share(np.float32(disc.radius + growth) - distance, width)
+    if disc.hole:
+        share -= _inside_share(np.float32(disc.hole - growth) - distance, width)
+    return np.maximum(share, 0, out=share)
 
 
 def _sector_cover(
@@ -130,84 +151,12 @@ def _sector_cover(
     return cover
 
 
-def _point_cover(family: PointFamily, word: int, turn: float, growth: float) -> Cover:
-    """Return the ink of a point-distributed target, turned about its reference point."""
-    places, radii = family.dots(word)
-    cosine, sine = math.cos(turn), math.sin(turn)
-    places = places @ np.array([[cosine, sine], [-sine, cosine]]) / family.dot_radius
-    radii = radii / family.dot_radius + growth
-
-    def cover(x: np.ndarray, y: np.ndarray, jacobian: np.ndarray) -> np.ndarray:
-        return _with_dots(np.zeros_like(x), x, y, places, radii, jacobian)
-
-    return cover
-
-
-def _dot_ring_cover(
-    family: DotFamily, word: int, turn: float, pinhole: float, growth: float
-) -> Cover:
-    """Return the ink of a ring of dots; dot 0 is in the direction `turn`."""
-    places = family.places(word, turn)
-    radii = [family.dot_radius + growth] * len(places)
-    inner = np.float32(family.ground_radius - growth)
-    outer = np.float32(family.border_radius + growth)
-
-    def cover(x: np.ndarray, y: np.ndarray, jacobian: np.ndarray) -> np.ndarray:
-        distance = np.sqrt(x * x + y * y)
-        width = _edge_width(jacobian, x, y, distance)
-        inked = _dot_share(distance, width, pinhole, growth)
-        border = _inside_share(distance - inner, width)
-        border *= _inside_share(outer - distance, width)
-        inked += border
-        return _with_dots(inked, x, y, places, radii, jacobian)
-
-    return cover
-
-
-def _circles_cover(family: CircleFamily, word: int, growth: float) -> Cover:
-    """Return the ink of a CCTag."""
-    radii = family.radii(np.array([word]))[0].tolist()
-
-    def cover(x: np.ndarray, y: np.ndarray, jacobian: np.ndarray) -> np.ndarray:
-        distance = np.sqrt(x * x + y * y)
-        width = _edge_width(jacobian, x, y, distance)
-        inked = np.zeros_like(distance)
-        for outer, inner in zip(radii[::2], radii[1::2], strict=True):
-            ring = _inside_share(np.float32(outer + growth) - distance, width)
-            ring -= _inside_share(np.float32(inner - growth) - distance, width)
-            inked += np.maximum(ring, 0)
-        return np.minimum(inked, 1)
-
-    return cover
-
-
-def _with_dots(
-    inked: np.ndarray,
-    x: np.ndarray,
-    y: np.ndarray,
-    places: np.ndarray,
-    radii: Sequence[float] | np.ndarray,
-    jacobian: np.ndarray,
-) -> np.ndarray:
-    """Add the ink of dots to samples, in place, and return them."""
-    for place, radius in zip(places, radii, strict=True):
-        across, up = x - np.float32(place[0]), y - np.float32(place[1])
-        near = np.maximum(np.abs(across), np.abs(up)) < radius + 2 * np.abs(jacobian).sum()
-        across, up = across[near], up[near]
-        distance = np.sqrt(across * across + up * up)
-        width = _edge_width(jacobian, across, up, distance)
-        inked[near] += _inside_share(np.float32(radius) - distance, width)
-    return np.minimum(inked, 1, out=inked)
-
-
-def square_cover(
-    name: str, number: int, half_side: float, turn: float, growth: float = 0.0
-) -> Cover:
-    """Return the ink of a square marker; half its side and growth are in radii of the mark."""
-    ink = 255 - marker(name, number, _CELL)
+def _cells_cover(cells: Cells, turn: float, growth: float) -> Cover:
+    """Return the ink of a square of cells."""
+    ink = np.kron(np.array(cells.inked, np.uint8) * 255, np.ones((_CELL, _CELL), np.uint8))
     side = len(ink)
-    ink = _grown(np.pad(ink, _CELL), growth * side / (2 * half_side))
-    return stamp_cover(ink, half_side * len(ink) / side, turn)
+    ink = _grown(np.pad(ink, _CELL), growth * side / (2 * cells.half_side))
+    return stamp_cover(ink, cells.half_side * len(ink) / side, turn)
 
 
 def _grown(ink: np.ndarray, growth: float) -> np.ndarray:
@@ -267,19 +216,6 @@ def _inside_share(distance: np.ndarray, width: np.ndarray) -> np.ndarray:
     """Return the fraction of each sample on the positive side of an edge."""
     share: np.ndarray = distance / width + np.float32(0.5)
     return np.clip(share, 0, 1, out=share)
-
-
-def _dot_share(
-    distance: np.ndarray, width: np.ndarray, pinhole: float, growth: float
-) -> np.ndarray:
-    """Return the fraction of each sample that a dot of radius 1 covers, without its pinhole.
-
-    `distance` is that from its centre, `width` that of its edge, float32, in its radii.
-    """
-    inked = _inside_share(np.float32(1 + growth) - distance, width)
-    if pinhole:
-        inked -= _inside_share(np.float32(pinhole - growth) - distance, width)
-    return inked
 
 
 def distractor_cover(generator: np.random.Generator) -> tuple[Cover, float]:

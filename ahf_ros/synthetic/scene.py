@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import math
 import warnings
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import cv2
 import numpy as np
 
 from ahf_ros.blas import one_blas_thread
-from ahf_ros.codes.designs import Proportions, proportions
-from ahf_ros.codes.families import ONE, code_family, family_in, kind_of, numbers_of
+from ahf_ros.codes.families import ONE, FamilyPrint, print_in
+from ahf_ros.codes.gsi import PointFamily
+from ahf_ros.codes.prints import Proportions
 from ahf_ros.settings.parameter import check_parameters, parameter
 from ahf_ros.synthetic.camera import Camera, Sensor, tilted_camera
 from ahf_ros.synthetic.covers import card_cover, design, distractor_cover
@@ -152,6 +153,7 @@ class SceneSettings:
     seed: int = parameter(
         0, 'Seed of poses, positions, codes, phases and noise.', minimum=0, maximum=2**31 - 1
     )
+    print: FamilyPrint = field(init=False, repr=False, hash=False)
 
     def __post_init__(self) -> None:
         """Check each parameter, that the wall fills the image and that the targets fit.
@@ -162,7 +164,8 @@ class SceneSettings:
             If not; the message names the field, its value and what is accepted.
         """
         check_parameters(self)
-        object.__setattr__(self, 'family', family_in(self.family, self.family_file))
+        object.__setattr__(self, 'print', print_in(self.family, self.family_file))
+        object.__setattr__(self, 'family', self.print.name)
         half_view = _half_view(self.width, self.height, self.focal_length)
         steepest = math.degrees(math.atan(0.95 / half_view))
         if self.tilt > steepest:
@@ -191,7 +194,7 @@ class SceneSettings:
     @property
     def proportions(self) -> Proportions:
         """What all targets have in common, in radii of the dot."""
-        return proportions(self.family, self.family_file).chosen(self.polarity, self.pinhole)
+        return self.print.design.proportions.chosen(self.polarity, self.pinhole)
 
     @property
     def dark(self) -> bool:
@@ -220,14 +223,13 @@ def check_distortion(settings: Any) -> None:
 
 
 def drawn_numbers(settings: Any, generator: np.random.Generator) -> list[int]:
-    """Return random IDs, as many as `settings.targets` of `settings.family` and `family_file`.
+    """Return random IDs of the print of some settings, as many as they have targets.
 
     IDs repeat only if there are more targets than codes.
     """
-    name, file, count = settings.family, settings.family_file, settings.targets
+    design, count = settings.print.design, settings.targets
     # IDs are drawn from those of gsi in the order of its data file
-    in_file = kind_of(name, file) == 'gsi'
-    every = code_family(name, file).numbers if in_file else numbers_of(name, file)
+    every = design.numbers if isinstance(design, PointFamily) else design.all_ids
     rounds = -(-count // len(every))
     shuffled = [generator.permutation(every) for _ in range(rounds)]
     numbers: list[int] = np.concatenate([np.empty(0, int), *shuffled])[:count].tolist()
@@ -351,7 +353,7 @@ def _coded_targets(
     Prints are larger where the wall is farther away, so that every dot is about `dot_radius` in
     the image.
     """
-    name, file, count = settings.family, settings.family_file, settings.targets
+    count = settings.targets
     semi_major = settings.dot_radius * (
         1 + settings.radius_spread * generator.uniform(-1, 1, count)
     )
@@ -366,7 +368,7 @@ def _coded_targets(
     hole = settings.proportions.pinhole
     cards, marks, targets = [], [], []
     for number, pixel, size, turn in zip(ids, placements.centres, semi_major, turns, strict=True):
-        printed = design(name, number, turn, gain / size, hole, file)
+        printed = design(settings.print.design, number, turn, gain / size, hole)
         mark = mark_at(camera, pixel, size, printed.reach, printed.cover)
         x, y = camera.project(mark.centre[None])[0].tolist()
         ellipse = camera.circle(mark.centre, printed.radius * mark.radius)
@@ -374,7 +376,7 @@ def _coded_targets(
         if settings.wall < 1:
             card = card_cover(free * _CARD_WIDTH, turn)
             cards.append(Mark(mark.centre, mark.radius, free, card))
-        targets.append(Target(number, printed.code, x, y, *ellipse, family=name))
+        targets.append(Target(number, printed.code, x, y, *ellipse, family=settings.family))
     return cards, marks, targets, placements
 
 

@@ -8,7 +8,7 @@ import cv2
 import pytest
 
 from ahf_ros import FAMILY_NAMES, SceneSettings, render
-from ahf_ros.codes.families import numbers_of
+from ahf_ros.codes.families import print_in
 from benchmarks import photographs
 
 
@@ -19,7 +19,7 @@ def test_the_truth_names_pictures_and_families_that_can_be_read():
         new = shown['family'] not in FAMILY_NAMES
         file = str(photographs.TRUTH / f'{shown["family"]}.json') if new else ''
         ids = {target[0] for target in shown['targets']}
-        assert ids <= set(numbers_of(shown['family'], file))
+        assert ids <= set(print_in(shown['family'], file).design.all_ids)
 
 
 @pytest.fixture

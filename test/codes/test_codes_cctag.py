@@ -7,7 +7,7 @@ import pytest
 
 from ahf_ros.codes import CCTAG_NAMES
 from ahf_ros.codes.cctag import circle_family
-from ahf_ros.codes.families import numbers_of
+from ahf_ros.codes.families import print_in
 from ahf_ros.codes.selection import select_ids
 
 
@@ -32,7 +32,7 @@ def test_radii_are_those_of_the_published_tables(
 @pytest.mark.parametrize(('name', 'count'), [*zip(CCTAG_NAMES, (32, 128), strict=True)])
 def test_every_id_has_circles_of_its_own(name: str, count: int) -> None:
     code = circle_family(name)
-    assert numbers_of(name) == list(range(count))
+    assert print_in(name).design.all_ids == range(count)
     assert len(np.unique(code.radii(code.numbers).round(3), axis=0)) == count
     for number in (-1, count):
         with pytest.raises(ValueError, match=f'number is {number}, .* {name} from 0 to'):
@@ -40,5 +40,5 @@ def test_every_id_has_circles_of_its_own(name: str, count: int) -> None:
 
 
 def test_a_set_of_ids_that_differ_in_many_rings_is_selected() -> None:
-    ids = select_ids('cctag4', range(128), 8)
+    ids = select_ids(print_in('cctag4').design, range(128), 8)
     assert min(bin(one ^ other).count('1') for one in ids for other in ids if one != other) >= 3

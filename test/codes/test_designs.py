@@ -11,8 +11,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ahf_ros.codes.designs import Arc, Contour, _outlines, printed_design, proportions
-from ahf_ros.codes.families import numbers_of
+from ahf_ros.codes.designs import Arc, Contour, _outlines, contours
+from ahf_ros.codes.families import print_in
 from ahf_ros.synthetic.covers import design
 from support.square_markers import needs_square_markers
 
@@ -65,21 +65,21 @@ def inside(contours: tuple[Contour, ...], points: np.ndarray) -> np.ndarray:
 def test_outlines_hold_the_ink_of_rendered_targets(name: str, tmp_path: Path) -> None:
     pinhole, file = 0.2, str(tmp_path / 'ringed.yaml') if name == 'ringed' else ''
     (tmp_path / 'ringed.yaml').write_text(RINGED)
-    every = numbers_of(name, file)
+    printed = print_in(name, file).design
+    every = printed.all_ids
     generator = np.random.default_rng(5)
     for number in (every[0], every[len(every) // 2], every[-1]):
-        rendered = design(name, number, 0.0, 0.0, pinhole, file)
-        printed = printed_design(name, number, pinhole, file)
-        assert printed.code == rendered.code
+        rendered = design(printed, number, 0.0, 0.0, pinhole)
+        outlines = contours(printed.ink(rendered.code, pinhole))
         points = generator.uniform(-1.1, 1.1, (1500, 2)) * rendered.reach
         points[:100] /= 5 * rendered.reach  # in the dot, about its hole
         x, y = points.astype(np.float32).T
         ink = rendered.cover(x[None], y[None], SHARP)[0]
         clear = np.abs(ink - 0.5) > 0.49
         assert clear.mean() > 0.8
-        assert (inside(printed.contours, points) == (ink > 0.5))[clear].all()
+        assert (inside(outlines, points) == (ink > 0.5))[clear].all()
         assert 0.05 < (ink > 0.5).mean() < 0.7
-        outside = np.hypot(*points.T) > 1.02 * proportions(name, file).reach
+        outside = np.hypot(*points.T) > 1.02 * printed.proportions.reach
         assert not ink[outside].any()
 
 
@@ -101,12 +101,12 @@ def test_outlines_of_cells_enclose_exactly_the_cells(rows: list[list[bool]]) -> 
 def test_proportions_of_a_family_that_tells_more(tmp_path: Path) -> None:
     file = tmp_path / 'ringed.yaml'
     file.write_text(RINGED)
-    found = proportions('ringed', str(file))
+    found = print_in('ringed', str(file)).design.proportions
     assert (found.pinhole, found.polarity, found.reach) == (0.1, 'bright', 4.5)
     assert found.quiet_zone == pytest.approx(5.4)
     assert found.radii['band_outer'] == pytest.approx(3)
     assert found.radii['circle_2_outer'] == 4.5
-    usual = [proportions(name) for name in ('metashape12', 'dots', 'gsi')]
+    usual = [print_in(name).design.proportions for name in ('metashape12', 'dots', 'gsi')]
     assert [(it.pinhole, it.polarity) for it in usual] == [
         (0.05, 'dark'),
         (0.05, 'dark'),
@@ -117,4 +117,4 @@ def test_proportions_of_a_family_that_tells_more(tmp_path: Path) -> None:
 def test_a_target_that_is_not_there_is_named() -> None:
     message = 'number is 162, accepted is an ID of metashape12 from 1 to 161'
     with pytest.raises(ValueError, match=re.escape(message)):
-        printed_design('metashape12', 162, 0.0)
+        print_in('metashape12').design.word(162)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import pickle
 from pathlib import Path
 
 import numpy as np
@@ -12,15 +13,11 @@ from ahf_ros.codes import ring
 from ahf_ros.codes.dots import DOTS_DESIGN
 from ahf_ros.codes.families import (
     FAMILY_NAMES,
+    FamilyPrint,
     check_numbers,
-    code_family,
-    colours_of,
-    families_in,
-    families_of,
-    family_in,
-    kind_of,
-    mirrored_number,
-    numbers_of,
+    print_in,
+    prints_in,
+    prints_of,
 )
 from ahf_ros.codes.gsi import GSI_LIBRARY
 from ahf_ros.detectors import DetectorSettings
@@ -28,12 +25,11 @@ from ahf_ros.synthetic.scene import SceneSettings
 
 
 def test_families_keep_their_order():
-    assert families_in('aicon14') == ('aicon14',)
-    assert families_in('aicon14, metashape12') == ('aicon14', 'metashape12')
-    assert families_in('gsi') == ('gsi',)
+    assert list(prints_in('aicon14')) == ['aicon14']
+    assert list(prints_in('aicon14, metashape12')) == ['aicon14', 'metashape12']
     several = 'aruco_4x4_250', 'gsi', 'metashape12', 'aruco_4x4_50'
-    assert families_in(','.join(several)) == several
-    assert families_in('auto') == FAMILY_NAMES
+    assert tuple(prints_in(','.join(several))) == several
+    assert tuple(prints_in('auto')) == FAMILY_NAMES
 
 
 @pytest.mark.parametrize(
@@ -56,7 +52,7 @@ def test_families_keep_their_order():
 )
 def test_lists_that_make_no_sense_are_refused(text, message):
     with pytest.raises(ValueError, match=message):
-        families_in(text)
+        prints_in(text)
 
 
 @pytest.mark.parametrize(
@@ -73,43 +69,43 @@ def test_lists_that_make_no_sense_are_refused(text, message):
     ],
 )
 def test_names_may_be_written_as_other_programs_do(text: str, names: tuple[str, ...]) -> None:
-    assert families_in(text) == names
+    assert tuple(prints_in(text)) == names
     assert DetectorSettings(family=text).family == ','.join(names)
     if len(names) == 1:
         assert SceneSettings(family=text, targets=0).family == names[0]
 
 
 def test_ids_that_no_family_has_are_named():
-    check_numbers('expected_ids', [1, 161, 500], ('metashape12', 'aicon14'), '')
+    two = prints_in('metashape12, aicon14').values()
+    check_numbers('expected_ids', [1, 161, 500], two)
     with pytest.raises(ValueError) as caught:
-        check_numbers('expected_ids', [162, 517, 0, 3], ('metashape12', 'aicon14'), '')
+        check_numbers('expected_ids', [162, 517, 0, 3], two)
     assert str(caught.value) == (
         'expected_ids has 0, 517, accepted are IDs of metashape12 from 1 to 161, aicon14 from 1 '
         'to 516'
     )
     with pytest.raises(ValueError, match=r'has 77, 78, .*, 86 and 15 more, accepted'):
-        check_numbers('expected_ids', range(1, 102), ('dots',), '')
+        check_numbers('expected_ids', range(1, 102), prints_in('dots').values())
 
 
 def test_every_number_is_that_of_a_word():
-    assert 505 in numbers_of('gsi')
+    assert 505 in print_in('gsi').design.all_ids
     for name in ring.FAMILY_NAMES:
         family = ring.family(name)
         assert [family.number(int(word)) for word in family.words[:9]] == list(range(1, 10))
-        assert len(numbers_of(name)) == family.words.size
+        assert len(family.all_ids) == family.words.size
 
 
 def test_every_ring_code_is_another_one_in_a_mirror():
     for name in ('metashape12', 'metashape14', 'aicon12', 'aicon14'):
         family = ring.family(name)
-        mirrored = [mirrored_number(name, int(word)) for word in family.words]
-        assert sorted(mirrored) == list(numbers_of(name))
-        again = [mirrored_number(name, family.word(number)) for number in mirrored]
-        assert again == list(numbers_of(name))
+        mirrored = [family.mirrored(int(word)) for word in family.words]
+        assert sorted(mirrored) == family.all_ids
+        again = [family.mirrored(family.word(number)) for number in mirrored]
+        assert again == family.all_ids
         symmetric = np.mean(np.array(mirrored) == again)
         assert 0.15 < symmetric < 0.4
-    assert mirrored_number('gsi', 1) is None
-    assert mirrored_number('', 71) is None
+    assert print_in('gsi').mirrored(1) is None
 
 
 RINGS = 'family: mine\nbits: 10\nband: [1.42, 1.87]\nwords: {changes: 6}\n'
@@ -126,17 +122,51 @@ def files(tmp_path: Path) -> str:
 
 
 def test_files_describe_more_families(files: str) -> None:
-    assert families_in('mine, metashape12', files) == ('mine', 'metashape12')
-    assert families_in('gsi, wide, mine', files) == ('gsi', 'wide', 'mine')
+    assert list(prints_in('mine, metashape12', files)) == ['mine', 'metashape12']
+    assert list(prints_in('gsi, wide, mine', files)) == ['gsi', 'wide', 'mine']
     # The file of rings of dots takes the place of the usual design.
     every = [name for name in FAMILY_NAMES if name != 'dots']
-    assert families_in('auto', files) == (*every, 'mine', 'wide')
-    assert [kind_of(name, files) for name in ('mine', 'wide', 'gsi')] == ['ring', 'dots', 'gsi']
-    assert code_family('mine', files).band == (1.42, 1.87)
-    assert code_family('wide', files) is code_family('dots', files)
-    assert code_family('metashape12', files) is ring.family('metashape12')
-    assert family_in('Mine', files) == 'mine'
-    check_numbers('ids', [1, 2], ('mine',), files)
+    found = prints_in('auto', files)
+    assert list(found) == [*every, 'mine', 'wide']
+    assert [found[name].kind for name in ('mine', 'wide', 'gsi')] == ['ring', 'dots', 'gsi']
+    mine = found['mine'].design
+    assert isinstance(mine, ring.Family) and mine.band == (1.42, 1.87)
+    assert print_in('metashape12', files).design is ring.family('metashape12')
+    assert print_in('Mine', files).design is mine
+    check_numbers('ids', [1, 2], [found['mine']])
+
+
+def test_a_usual_design_that_a_file_replaces_is_called_as_the_file_says(files: str) -> None:
+    assert print_in('dots', files) == print_in('wide', files)
+    assert list(prints_in('gsi, dots', files)) == ['gsi', 'wide']
+    settings = DetectorSettings(family='dots', family_file=files)
+    assert (settings.family, settings.families) == ('wide', ('wide',))
+    assert SceneSettings(family='dots', family_file=files, targets=0).family == 'wide'
+
+
+def test_records_of_families_go_to_other_processes_without_their_prints(files: str) -> None:
+    settings = DetectorSettings(family='mine, metashape12', family_file=files)
+    assert settings.prints['mine'].design is settings.prints['mine'].design
+    sent = pickle.loads(pickle.dumps(settings))
+    assert (sent, hash(sent)) == (settings, hash(settings))
+    assert not any('design' in vars(of) for of in sent.prints.values())
+    assert sent.prints['mine'].reach == 1.87
+    assert len(pickle.dumps(settings)) < 1500
+
+
+def test_settings_keep_what_a_file_said_when_they_were_made(files: str) -> None:
+    path = Path(files.split(',')[0])
+    before = DetectorSettings(family='mine', family_file=str(path))
+    path.write_text(RINGS.replace('1.87', '1.95'))
+    after = DetectorSettings(family='mine', family_file=str(path))
+    assert (before.prints['mine'].reach, after.prints['mine'].reach) == (1.87, 1.95)
+    assert before != after
+
+
+def test_the_reach_of_a_target_is_in_semi_axes_of_its_ellipse() -> None:
+    assert print_in('metashape12').reach == 3.5
+    assert print_in('aruco_4x4_50').reach == pytest.approx(2**0.5)
+    assert FamilyPrint('cctag3', 'cctag').reach == 1
 
 
 @pytest.mark.parametrize(
@@ -149,43 +179,41 @@ def test_files_describe_more_families(files: str) -> None:
 )
 def test_names_that_no_file_describes_are_refused(files: str, text: str, message: str) -> None:
     with pytest.raises(ValueError, match=message):
-        families_in(text, files)
+        prints_in(text, files)
 
 
 @pytest.mark.parametrize('library', [DOTS_DESIGN, GSI_LIBRARY])
 def test_a_file_that_changes_is_read_again(library: Path, tmp_path: Path) -> None:
     file, design = tmp_path / 'mine.json', json.loads(library.read_text())
     file.write_text(json.dumps(design | {'family': 'mine'}))
-    first = families_of(str(file))
+    first = prints_of(str(file))
     assert list(first) == ['mine']
-    assert families_of(str(file))['mine'] is first['mine']
+    assert prints_of(str(file))['mine'] is first['mine']
     file.write_text(json.dumps(design | {'family': 'another'}))
-    assert list(families_of(str(file))) == ['another']
+    assert list(prints_of(str(file))) == ['another']
 
 
 def test_colours_of_families(files: str, tmp_path: Path) -> None:
     bright = tmp_path / 'bright.yaml'
     bright.write_text(RINGS.replace('mine', 'white') + 'polarity: bright\n')
     every = f'{files}, {bright}'
-    assert colours_of(['white'], every) == 'bright'
-    for names in (['white', 'mine'], ['wide'], ['gsi'], ['metashape12'], ['aruco_4x4_50']):
-        assert colours_of(names, every) == 'both'
+    assert DetectorSettings(family='white', family_file=every).polarities == (-1,)
+    for names in ('white, mine', 'wide', 'gsi', 'metashape12', 'aruco_4x4_50'):
+        assert DetectorSettings(family=names, family_file=every).polarities == (1, -1)
 
 
 def test_files_that_do_not_fit_are_refused(files: str, tmp_path: Path) -> None:
     with pytest.raises(
         ValueError, match=r"rings\.yaml, line 1: family is 'mine', accepted is a n"
     ):
-        families_of(f'{files}, {tmp_path / "rings.yaml"}')
-    with pytest.raises(ValueError, match=r"family is 'his', .* describes mine, wide; accepted is"):
-        code_family('his', files)
-    assert code_family('gsi', files) is code_family('gsi')
+        prints_of(f'{files}, {tmp_path / "rings.yaml"}')
+    assert print_in('gsi', files) is print_in('gsi')
     with pytest.raises(ValueError, match=r'missing\.yaml cannot be read'):
-        families_in('mine', 'missing.yaml')
+        prints_in('mine', 'missing.yaml')
     named = tmp_path / 'named.yaml'
     named.write_text(RINGS.replace('mine', 'cct12'))
     with pytest.raises(ValueError, match="family is 'cct12', accepted is a name that no other"):
-        families_of(str(named))
+        prints_of(str(named))
     for text in ('auto', 'mine,metashape12'):
         with pytest.raises(ValueError, match=f"family is '{text}', accepted is one family"):
-            family_in(text, files)
+            print_in(text, files)

@@ -11,7 +11,7 @@ import pytest
 
 from ahf_ros.codes import selection
 from ahf_ros.codes.dots import dot_family
-from ahf_ros.codes.families import numbers_of
+from ahf_ros.codes.families import print_in
 from ahf_ros.codes.ring import family
 from ahf_ros.codes.selection import independent_set, select_ids
 from support.square_markers import needs_square_markers
@@ -19,7 +19,7 @@ from support.square_markers import needs_square_markers
 
 def smallest_distance(name: str, ids: Sequence[int]) -> int:
     """Return the smallest Hamming distance between two words, over all rotations."""
-    distances = selection._distances(selection._orbits(name, np.asarray(ids), ''))
+    distances = selection._distances(print_in(name).design.orbits(np.asarray(ids)))
     return int(distances[np.triu_indices(len(ids), 1)].min())
 
 
@@ -42,7 +42,8 @@ def turned_by_a_cover(word: int, bits: int) -> set[str]:
 
 @pytest.mark.parametrize(('name', 'pairs'), [('metashape12', 1652), ('metashape14', 9414)])
 def test_as_many_pairs_are_confused_as_was_measured(name: str, pairs: int) -> None:
-    confused = selection._confused(name, np.asarray(numbers_of(name)), '')
+    design = print_in(name).design
+    confused = selection._confused(design, np.asarray(design.all_ids))
     assert np.triu(confused, 1).sum() == pairs
 
 
@@ -52,7 +53,7 @@ def test_as_many_pairs_are_confused_as_was_measured(name: str, pairs: int) -> No
 )
 def test_selected_words_are_far_apart_and_never_confused(name, count, least) -> None:
     code = dot_family() if name == 'dots' else family(name)
-    ids = select_ids(name, numbers_of(name), count)
+    ids = select_ids(code, code.all_ids, count)
     assert len(set(ids)) == count and ids == sorted(ids)
     words = [code.word(number) for number in ids]
     for first, second in combinations(words, 2):
@@ -66,26 +67,27 @@ def test_selected_words_are_far_apart_and_never_confused(name, count, least) -> 
 
 def test_a_selection_is_the_same_every_time_and_keeps_to_the_ids_given() -> None:
     given = range(30, 130, 2)
-    first = select_ids('metashape12', given, 10)
-    assert first == select_ids('metashape12', given, 10)
+    rings = family('metashape12')
+    first = select_ids(rings, given, 10)
+    assert first == select_ids(rings, given, 10)
     assert set(first) <= set(given)
-    assert select_ids('metashape12', [7], 1) == [7]
+    assert select_ids(rings, [7], 1) == [7]
 
 
 def test_point_targets_differ_in_their_dots() -> None:
-    ids = select_ids('gsi', numbers_of('gsi'), 20)
+    ids = select_ids(print_in('gsi').design, print_in('gsi').design.all_ids, 20)
     assert smallest_distance('gsi', ids) == 4
 
 
 @needs_square_markers
 def test_square_markers_differ_in_any_rotation() -> None:
-    ids = select_ids('aruco_4x4_250', range(250), 8)
+    ids = select_ids(print_in('aruco_4x4_250').design, range(250), 8)
     assert smallest_distance('aruco_4x4_250', ids) > smallest_distance('aruco_4x4_250', range(8))
 
 
 def test_a_set_that_is_too_large_is_refused_with_the_largest_one() -> None:
     with pytest.raises(ValueError, match='best is 150, accepted is an integer from 1 to ') as info:
-        select_ids('metashape12', range(1, 162), 150)
+        select_ids(print_in('metashape12').design, range(1, 162), 150)
     (largest,) = re.findall(r'from 1 to (\d+)', str(info.value))
     assert int(largest) >= 79
 

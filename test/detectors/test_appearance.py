@@ -16,7 +16,7 @@ from ahf_ros.detectors.ring.decoding import Words
 from ahf_ros.detectors.ring.detector import find_hypotheses
 from ahf_ros.detectors.ring.polar import polar_images
 from ahf_ros.features.frame import ellipse_axes
-from ahf_ros.synthetic.covers import Cover, ring_cover
+from ahf_ros.synthetic.covers import Cover, ink_cover
 from ahf_ros.synthetic.scene import SceneSettings, render
 from benchmarks import occluders
 from benchmarks.disturbed import Targets
@@ -75,8 +75,8 @@ def test_a_rim_between_all_marks_is_of_another_print() -> None:
 
     def ink(turn: float) -> Cover:
         marks, round_them = (
-            ring_cover(code, code.word(146), turn, 0.05),
-            ring_cover(rim, 4095, turn, 0.05),
+            ink_cover(code.ink(code.word(146), 0.05), turn),
+            ink_cover(rim.ink(4095, 0.05), turn),
         )
         return lambda *place: np.maximum(marks(*place), round_them(*place))
 

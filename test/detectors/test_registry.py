@@ -79,7 +79,7 @@ def test_every_family_chooses_a_detector():
         kind = family.partition('_')[0]
         kind = kind.rstrip('34') if kind in ('cctag3', 'cctag4') else kind
         name = kind if kind in ('aruco', 'apriltag', 'gsi', 'dots', 'cctag') else 'ring'
-        assert detector_name('auto', family) == name
+        assert detector_name('auto', DetectorSettings(family=family)) == name
 
 
 @pytest.mark.parametrize(

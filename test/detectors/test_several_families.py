@@ -13,7 +13,7 @@ from ahf_ros.codes import RING_NAMES
 from ahf_ros.codes.ring import family
 from ahf_ros.detectors import DetectorSettings, create_detector, estimator
 from ahf_ros.detectors.ring.choice import choose_families, further_families
-from ahf_ros.synthetic.covers import Cover, ring_cover
+from ahf_ros.synthetic.covers import Cover, ink_cover
 from ahf_ros.synthetic.scene import Rendering, SceneSettings
 from ahf_ros.target import UNDECODED, Target
 from benchmarks.exposure import Exposure
@@ -98,7 +98,7 @@ def test_centres_are_refined_by_each_target_s_own_family():
 
 
 def ink(name: str, word: int) -> Callable[[float], Cover]:
-    return lambda turn: ring_cover(family(name), word, turn, 0.05)
+    return lambda turn: ink_cover(family(name).ink(word, 0.05), turn)
 
 
 @cache

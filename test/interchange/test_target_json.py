@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from ahf_ros import SceneSettings, identify
+from ahf_ros.codes.families import prints_in
 from ahf_ros.detectors.ring.hypotheses import CERTAIN
 from ahf_ros.interchange.target_json import read_results, targets_from_json, to_json
 from ahf_ros.target import (
@@ -48,6 +49,7 @@ def test_codes_say_how_they_are_read_and_are_read_without_that() -> None:
     record = to_json(found, 'a.png', (480, 640), 'metashape12', 'ring')
     reading = {'bits': 12, 'first_bit': 'lowest', 'direction': 'counter-clockwise'}
     assert record['codes'] == {'metashape12': reading}
+    assert record['reach'] == {'metashape12': 3.5}
     for item, target in zip(record['targets'], found, strict=True):
         assert (len(item['bits']), int(item['bits'], 2)) == (12, target.code)
         band = ''.join(
@@ -56,7 +58,7 @@ def test_codes_say_how_they_are_read_and_are_read_without_that() -> None:
         )
         assert item['bits'] in {band[turn:] + band[:turn] for turn in range(12)}
         del item['bits']
-    del record['codes']
+    del record['codes'], record['reach']
     assert targets_from_json(record, 'an older file') == list(found)
 
 
@@ -67,7 +69,8 @@ def test_codes_of_other_families_say_what_they_are() -> None:
         Target(2, 513, 1.0, 2.0, 3.0, 3.0, family='dots'),
         Target(-1, 0, 1.0, 2.0, 3.0, 3.0),
     ]
-    record = to_json(Identification(tuple(targets)), 'a.png', (30, 20), 'auto', 'auto')
+    found = Identification(tuple(targets), prints=prints_in('auto'))
+    record = to_json(found, 'a.png', (30, 20), 'auto', 'auto')
     assert {name: of['direction'] for name, of in record['codes'].items()} == {
         'gsi': 'by position',
         'dots': 'either',

@@ -9,8 +9,8 @@ import cv2
 import numpy as np
 import pytest
 
-from ahf_ros.codes.designs import circle, printed_design
-from ahf_ros.codes.families import FAMILY_NAMES, numbers_of
+from ahf_ros.codes.designs import circle, contours
+from ahf_ros.codes.families import FAMILY_NAMES, print_in
 from ahf_ros.synthetic.bent import exposure
 from ahf_ros.synthetic.bent.ink import inked
 from ahf_ros.synthetic.bent.lens import Lens
@@ -152,11 +152,13 @@ def test_distortion_is_that_of_opencv() -> None:
     ],
 )
 def test_outlines_hold_the_ink_that_the_other_maker_draws(name: str) -> None:
-    number = list(numbers_of(name))[2]
+    printed = print_in(name).design
+    number = printed.all_ids[2]
     hole = 0.1 if name.startswith(('metashape', 'aicon', 'cct1', 'dots')) else 0.0
-    other = design(name, number, 0.0, 0.0, hole)
+    other = design(printed, number, 0.0, 0.0, hole)
     x, y = np.random.default_rng(3).uniform(-1, 1, (2, 200, 200)).astype(np.float32) * other.reach
-    here = inked(printed_design(name, number, hole).contours, x.astype(float), y.astype(float))
+    outlines = contours(printed.ink(printed.word(number), hole))
+    here = inked(outlines, x.astype(float), y.astype(float))
     there = other.cover(x, y, np.eye(2, dtype=np.float32) * np.float32(1e-3))
     assert 0.02 < here.mean() < 0.98
     assert (here != (there > 0.5)).mean() < 0.005

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from ahf_ros.cli import main
-from ahf_ros.codes.designs import proportions
 from ahf_ros.codes.dots import dot_family
+from ahf_ros.codes.families import print_in
 from ahf_ros.codes.gsi import GSI_LIBRARY, point_family
 from ahf_ros.interchange.truth_files import read_truth
 from ahf_ros.synthetic.camera import Camera, tilted_camera
@@ -32,7 +32,7 @@ def camera(tilt: float = 0.0) -> Camera:
 
 def printed(family: str, number: int, turn: float, radius: float, looking: Camera) -> np.ndarray:
     """Return the ink in each pixel under even light."""
-    shown = design(family, number, turn, 0.0, 0.0)
+    shown = design(print_in(family).design, number, turn, 0.0, 0.0)
     image = np.zeros((400, 400), np.float32)
     mark = Mark(np.zeros(2), radius, shown.reach, shown.cover)
     print_mark(image, np.ones_like(image), mark, looking, 1.0, 0.7)
@@ -98,9 +98,9 @@ def test_steep_views_can_be_rendered() -> None:
 
 
 def test_targets_are_as_far_apart_as_they_are_wide() -> None:
-    assert proportions('gsi').quiet_zone == pytest.approx(GSI.reach / 1.5 + 1)
+    assert GSI.proportions.quiet_zone == pytest.approx(GSI.reach / 1.5 + 1)
     for name in ('dots', 'metashape12'):
-        assert proportions(name).quiet_zone == pytest.approx(4.2)
+        assert print_in(name).design.proportions.quiet_zone == pytest.approx(4.2)
     with pytest.raises(ValueError, match=r'targets is 60, accepted is an integer from 0 to 4 '):
         SceneSettings(width=800, height=600, targets=60, family='gsi', dot_radius=7)
     with pytest.raises(ValueError, match="sizes is '1, x', accepted are numbers from"):
@@ -119,10 +119,11 @@ def test_the_command_renders_families_from_data_files(tmp_path: Path) -> None:
 
 def ink_of(name: str, growth: float) -> np.ndarray:
     """Return where there is ink, on a grid that is the same for all growths."""
-    half = proportions(name).reach + 0.5
+    printed = print_in(name).design
+    half = printed.proportions.reach + 0.5
     along = np.arange(-half, half, STEP, dtype=np.float32)
     x, y = np.meshgrid(along, along[::-1])
-    cover = design(name, NUMBER, 0.4, growth, 0.0).cover
+    cover = design(printed, NUMBER, 0.4, growth, 0.0).cover
     return cover(x, y, np.eye(2, dtype=np.float32) * np.float32(STEP)) > 0.5
 
 
@@ -153,5 +154,5 @@ def test_the_same_growth_leaves_holes_that_are_smaller() -> None:
     near[0] = 0.05, 0.25
     jacobian = np.eye(2, dtype=np.float32) * np.float32(STEP)
     for growth, inked in ((0.0, [0, 0]), (0.1, [0, 1]), (0.35, [1, 1])):
-        cover = design('metashape12', 1, 0.0, growth, 0.3).cover
+        cover = design(print_in('metashape12').design, 1, 0.0, growth, 0.3).cover
         assert cover(near, near * 0, jacobian)[0].tolist() == inked

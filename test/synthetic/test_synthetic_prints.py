@@ -12,7 +12,7 @@ import pytest
 from ahf_ros.codes.ring import family
 from ahf_ros.synthetic import prints
 from ahf_ros.synthetic.camera import Camera, tilted_camera
-from ahf_ros.synthetic.covers import Cover, distractor_cover, ring_cover
+from ahf_ros.synthetic.covers import Cover, distractor_cover, ink_cover
 from ahf_ros.synthetic.prints import Mark, print_mark
 
 RING = family('metashape12')
@@ -30,7 +30,7 @@ def printed(mark: Mark, looking: Camera, blur: float = 0.7) -> np.ndarray:
 
 
 def target(centre: tuple[float, float], radius: float, turn: float = 0.3) -> Mark:
-    return Mark(np.array(centre), radius, RING.band_outer, ring_cover(RING, 71, turn, 0.0))
+    return Mark(np.array(centre), radius, RING.band_outer, ink_cover(RING.ink(71), turn))
 
 
 def ellipse_mask(mark: Mark, looking: Camera, radius: float) -> np.ndarray:
@@ -97,7 +97,7 @@ def test_prints_under_tilt_match_brute_force() -> None:
 
 def test_a_pinhole_is_white() -> None:
     looking = camera()
-    mark = Mark(np.zeros(2), 12.0, 3.5, ring_cover(RING, 71, 0.0, 0.25))
+    mark = Mark(np.zeros(2), 12.0, 3.5, ink_cover(RING.ink(71, 0.25), 0.0))
     change = printed(target((0.0, 0.0), 12.0, 0.0), looking) - printed(mark, looking)
     assert change.sum() == pytest.approx(math.pi * 3.0**2, rel=0.01)
 
@@ -105,7 +105,7 @@ def test_a_pinhole_is_white() -> None:
 def test_circles_are_inked_and_grow() -> None:
     looking, circled = camera(), replace(RING, circles=((4.0, 4.5),))
     marks = [
-        Mark(np.zeros(2), 10.0, 4.6, ring_cover(of, 71, 0.0, 0.0, 0.05)) for of in (RING, circled)
+        Mark(np.zeros(2), 10.0, 4.6, ink_cover(of.ink(71), 0.0, 0.05)) for of in (RING, circled)
     ]
     change = printed(marks[1], looking) - printed(marks[0], looking)
     assert change.sum() == pytest.approx(math.pi * (45.5**2 - 39.5**2), rel=0.01)
@@ -122,7 +122,7 @@ def test_blocks_do_not_show(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_a_mark_may_be_cut_by_the_frame() -> None:
     looking = camera()
     corner = looking.wall(np.array([[199.0, 0.0]]))[0]
-    ink = printed(Mark(corner, 20.0, 3.5, ring_cover(RING, 71, 0.0, 0.0)), looking)
+    ink = printed(Mark(corner, 20.0, 3.5, ink_cover(RING.ink(71), 0.0)), looking)
     assert ink[3, 196] == pytest.approx(1, abs=1e-3)
 
 

@@ -9,7 +9,7 @@ from itertools import pairwise
 import cv2
 import numpy as np
 
-from ahf_ros.codes.designs import Contour, circle, printed_design
+from ahf_ros.codes.designs import Contour, circle, contours
 from ahf_ros.synthetic.bent.lens import Lens
 from ahf_ros.synthetic.bent.settings import BentSettings, sheet_grid
 from ahf_ros.synthetic.bent.sheet import Sheet
@@ -174,15 +174,14 @@ def _printed(
     generator: np.random.Generator,
 ) -> tuple[Printed, int]:
     """Return a target that is printed, turned at random, and its code word."""
-    design = printed_design(
-        settings.family, number, settings.proportions.pinhole, settings.family_file
-    )
-    contours, reach = design.contours, settings.proportions.reach
+    design, common = settings.print.design, settings.proportions
+    word = design.word(number)
+    outlines, reach = contours(design.ink(word, common.pinhole)), common.reach
     if not settings.dark:
-        reach = settings.proportions.quiet_zone
-        contours = (circle(reach), *contours)
+        reach = common.quiet_zone
+        outlines = (circle(reach), *outlines)
     turn = float(generator.uniform(0, 2 * math.pi))
-    return Printed(centre, turn, contours, settings.printed_radius, reach), design.code
+    return Printed(centre, turn, outlines, settings.printed_radius, reach), word
 
 
 def _target(

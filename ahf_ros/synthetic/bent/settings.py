@@ -6,8 +6,8 @@ import math
 from dataclasses import dataclass, field, fields
 from typing import Any
 
-from ahf_ros.codes.designs import Proportions, proportions
-from ahf_ros.codes.families import family_in
+from ahf_ros.codes.families import FamilyPrint, print_in
+from ahf_ros.codes.prints import Proportions
 from ahf_ros.settings.parameter import check_parameters, parameter
 from ahf_ros.synthetic.layout import finest_grid, quiet_radius
 from ahf_ros.synthetic.scene import SceneSettings, check_distortion
@@ -121,6 +121,7 @@ class BentSettings:
     motion: float = parameter(
         1.0, 'Path of the image during the exposure, px.', minimum=0.0, maximum=20.0
     )
+    print: FamilyPrint = field(init=False, repr=False, hash=False)
 
     def __post_init__(self) -> None:
         """Check each parameter, that the lens is invertible and that the sheets fit.
@@ -131,7 +132,8 @@ class BentSettings:
             If not; the message names the field, its value and what is accepted.
         """
         check_parameters(self)
-        object.__setattr__(self, 'family', family_in(self.family, self.family_file))
+        object.__setattr__(self, 'print', print_in(self.family, self.family_file))
+        object.__setattr__(self, 'family', self.print.name)
         check_distortion(self)
         every = (self.fits(count) for count in range(1, self.on_sheet + 1))
         if not all(fitting := list(every)):
@@ -153,7 +155,7 @@ class BentSettings:
     @property
     def proportions(self) -> Proportions:
         """What all targets have in common, in radii of the dot."""
-        return proportions(self.family, self.family_file).chosen(self.polarity, self.pinhole)
+        return self.print.design.proportions.chosen(self.polarity, self.pinhole)
 
     @property
     def dark(self) -> bool:
