@@ -248,7 +248,7 @@ class PublishedGsiDetector(FamilyDetector):
                         id=code.number(word) or 0,
                         code=word,
                         confidence=1 - bias / _MAXIMUM_BIAS,
-                        family='gsi',  # whichever data file describes it
+                        family=code.name,
                         dots=tuple(map(tuple, dots[members].tolist())),
                         template_dots=len(code.template),
                         polarity=polarity,
