@@ -213,17 +213,14 @@ class FamilyRecord(Protocol):
     @property
     def name(self) -> str:
         """Its name, as targets have it."""
-        ...
 
     @property
     def reach(self) -> float:
         """Radius of the circle that holds a target, in semi-axes of the reported ellipse."""
-        ...
 
     @property
     def reading(self) -> Mapping[str, int | str]:
         """How code words are read: `bits`, `first_bit` and `direction`; empty if none are read."""
-        ...
 
 
 Prints = Mapping[str, FamilyRecord]

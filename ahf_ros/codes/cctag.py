@@ -7,7 +7,6 @@ is left in the middle is white. The tables of radii that the authors print follo
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -35,11 +34,6 @@ class CircleFamily(Print):
     def numbers(self) -> np.ndarray:
         """All IDs, ndarray of int64, ascending."""
         return np.arange(1 << self.bits)
-
-    @property
-    def all_ids(self) -> Sequence[int]:
-        """All IDs, ascending."""
-        return range(1 << self.bits)
 
     @property
     def proportions(self) -> Proportions:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, TypeVar
 
@@ -28,12 +27,6 @@ class CyclicFamily(Print):
     bits: int
     words: np.ndarray
     numbers: np.ndarray
-
-    @property
-    def all_ids(self) -> Sequence[int]:
-        """All IDs, ascending."""
-        ids: list[int] = sorted(self.numbers.tolist())
-        return ids
 
     @property
     def reading(self) -> dict[str, int | str]:

@@ -101,12 +101,6 @@ class PointFamily(Print):
         return int(found[0])
 
     @property
-    def all_ids(self) -> Sequence[int]:
-        """All IDs, ascending."""
-        ids: list[int] = sorted(self.numbers.tolist())
-        return ids
-
-    @property
     def reading(self) -> dict[str, int | str]:
         """How words are read."""
         bits = int(self.position_numbers.max()) + 1

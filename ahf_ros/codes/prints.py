@@ -8,9 +8,8 @@ The printer draws the outlines of the shapes, and rendered scenes have their ink
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
@@ -90,6 +89,8 @@ class Print(ABC):
     ----------
     name : str
         Name of the family.
+    numbers : ndarray of int64, shape (n,)
+        Its IDs, in the order of its code words.
     polarity : str
         Colour that the ink of targets may have, 'dark', 'bright' or 'both'.
     has_pinhole : bool
@@ -102,10 +103,16 @@ class Print(ABC):
     polarity: str = 'both'
     has_pinhole: ClassVar[bool] = False
 
+    if TYPE_CHECKING:  # a field of some prints, for which a property here would be the default
+
+        @property
+        def numbers(self) -> np.ndarray:
+            """All IDs."""
+
     @property
-    @abstractmethod
-    def all_ids(self) -> Sequence[int]:
+    def all_ids(self) -> list[int]:
         """All IDs, ascending."""
+        return [int(number) for number in np.sort(self.numbers)]
 
     @abstractmethod
     def word(self, number: int) -> int:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache, lru_cache
 from typing import Any
@@ -30,9 +29,9 @@ class CellPrint(Print):
     name: str
 
     @property
-    def all_ids(self) -> Sequence[int]:
-        """All IDs, ascending."""
-        return range(len(dictionary(self.name).bytesList))
+    def numbers(self) -> np.ndarray:
+        """All IDs, ndarray of int64, ascending."""
+        return np.arange(len(dictionary(self.name).bytesList))
 
     def word(self, number: int) -> int:
         """Return the code word of an ID, which is the same."""

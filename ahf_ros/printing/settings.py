@@ -94,7 +94,7 @@ class SheetSettings:
     def numbers(self) -> list[int]:
         """IDs of the targets, ascending; a ValueError if so many as `best` are not found."""
         given = numbers_in('ids', self.ids)
-        every = sorted(given) if given else list(self.print.design.all_ids)
+        every = sorted(given) if given else self.print.design.all_ids
         if not self.best:
             return every
         if self.best > len(every):

@@ -5,12 +5,11 @@ from __future__ import annotations
 import math
 import string
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 
 import cv2
 import numpy as np
 
-from ahf_ros.codes.prints import Cells, Disc, Print, Ring, Sectors, Shape
+from ahf_ros.codes.prints import Cells, Disc, Ring, Sectors, Shape
 
 _CELL = 32  # side of a cell in the picture of a square marker, px
 _SIDE = 256  # px of the picture of a distractor, finer than any in an image
@@ -24,44 +23,12 @@ is the change of (x, y) across the width of an anti-aliased edge, along the colu
 """
 
 
-@dataclass(frozen=True, slots=True)
-class Design:
-    """A printed target: its code word and its ink, with lengths in radii of its dot.
-
-    A circle of radius `reach` holds all ink. The ellipse that is reported of the target is the
-    image of a circle of radius `radius`.
-    """
-
-    code: int
-    cover: Cover
-    reach: float
-    radius: float
-
-
-def design(printed: Print, number: int, turn: float, growth: float, pinhole: float) -> Design:
-    """Return the design of a target of a family.
-
-    Parameters
-    ----------
-    turn : float
-        Counter-clockwise rotation, rad.
-    growth : float
-        Length by which the ink is larger on every edge, in radii of the dot; less than half of a
-        sector or a cell.
-    pinhole : float
-        Radius of the hole in the centre of the dot, in radii of the dot; 0 for none. Square
-        markers, point-distributed targets and CCTags have none.
-    """
-    word, common = printed.word(number), printed.proportions
-    cover = ink_cover(printed.ink(word, pinhole), turn, growth)
-    return Design(word, cover, common.reach + max(growth, 0.0), common.radius)
-
-
 def ink_cover(ink: Sequence[Shape], turn: float, growth: float = 0.0) -> Cover:
-    """Return the ink of shapes that are turned and have grown, as for `design`.
+    """Return the ink of shapes, turned counter-clockwise by an angle in rad.
 
-    The signed distance to each edge, in widths of an anti-aliased edge, gives the covered
-    fraction of a sample.
+    `growth` is the length by which it is larger on every edge, in radii of the dot, less than half
+    of a sector or a cell. The signed distance to each edge, in widths of an anti-aliased edge,
+    gives the covered fraction of a sample.
     """
     cells = [shape for shape in ink if isinstance(shape, Cells)]
     if cells:

@@ -16,7 +16,7 @@ from ahf_ros.codes.gsi import PointFamily
 from ahf_ros.codes.prints import Proportions
 from ahf_ros.settings.parameter import check_parameters, parameter
 from ahf_ros.synthetic.camera import Camera, Sensor, tilted_camera
-from ahf_ros.synthetic.covers import card_cover, design, distractor_cover
+from ahf_ros.synthetic.covers import card_cover, distractor_cover, ink_cover
 from ahf_ros.synthetic.layout import (
     Placements,
     finest_grid,
@@ -365,18 +365,19 @@ def _coded_targets(
     placements = grid_placements(camera, reach, generator)
     gain = settings.edge_shift if settings.dark else -settings.edge_shift
 
-    hole = settings.proportions.pinhole
+    printed, common = settings.print.design, settings.proportions
     cards, marks, targets = [], [], []
     for number, pixel, size, turn in zip(ids, placements.centres, semi_major, turns, strict=True):
-        printed = design(settings.print.design, number, turn, gain / size, hole)
-        mark = mark_at(camera, pixel, size, printed.reach, printed.cover)
+        word, growth = printed.word(number), gain / size
+        cover = ink_cover(printed.ink(word, common.pinhole), turn, growth)
+        mark = mark_at(camera, pixel, size, common.reach + max(growth, 0.0), cover)
         x, y = camera.project(mark.centre[None])[0].tolist()
-        ellipse = camera.circle(mark.centre, printed.radius * mark.radius)
+        ellipse = camera.circle(mark.centre, common.radius * mark.radius)
         marks.append(mark)
         if settings.wall < 1:
             card = card_cover(free * _CARD_WIDTH, turn)
             cards.append(Mark(mark.centre, mark.radius, free, card))
-        targets.append(Target(number, printed.code, x, y, *ellipse, family=settings.family))
+        targets.append(Target(number, word, x, y, *ellipse, family=settings.family))
     return cards, marks, targets, placements
 
 

@@ -32,7 +32,7 @@ def test_radii_are_those_of_the_published_tables(
 @pytest.mark.parametrize(('name', 'count'), [*zip(CCTAG_NAMES, (32, 128), strict=True)])
 def test_every_id_has_circles_of_its_own(name: str, count: int) -> None:
     code = circle_family(name)
-    assert print_in(name).design.all_ids == range(count)
+    assert print_in(name).design.all_ids == list(range(count))
     assert len(np.unique(code.radii(code.numbers).round(3), axis=0)) == count
     for number in (-1, count):
         with pytest.raises(ValueError, match=f'number is {number}, .* {name} from 0 to'):

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from ahf_ros.codes.designs import Arc, Contour, _outlines, contours
 from ahf_ros.codes.families import print_in
-from ahf_ros.synthetic.covers import design
+from ahf_ros.synthetic.covers import ink_cover
 from support.square_markers import needs_square_markers
 
 ROUND = ('metashape12', 'metashape20', 'aicon14', 'gsi', 'dots', 'cctag4')
@@ -69,17 +69,16 @@ def test_outlines_hold_the_ink_of_rendered_targets(name: str, tmp_path: Path) ->
     every = printed.all_ids
     generator = np.random.default_rng(5)
     for number in (every[0], every[len(every) // 2], every[-1]):
-        rendered = design(printed, number, 0.0, 0.0, pinhole)
-        outlines = contours(printed.ink(rendered.code, pinhole))
-        points = generator.uniform(-1.1, 1.1, (1500, 2)) * rendered.reach
-        points[:100] /= 5 * rendered.reach  # in the dot, about its hole
+        shapes, reach = printed.ink(printed.word(number), pinhole), printed.proportions.reach
+        points = generator.uniform(-1.1, 1.1, (1500, 2)) * reach
+        points[:100] /= 5 * reach  # in the dot, about its hole
         x, y = points.astype(np.float32).T
-        ink = rendered.cover(x[None], y[None], SHARP)[0]
+        ink = ink_cover(shapes, 0.0)(x[None], y[None], SHARP)[0]
         clear = np.abs(ink - 0.5) > 0.49
         assert clear.mean() > 0.8
-        assert (inside(outlines, points) == (ink > 0.5))[clear].all()
+        assert (inside(contours(shapes), points) == (ink > 0.5))[clear].all()
         assert 0.05 < (ink > 0.5).mean() < 0.7
-        outside = np.hypot(*points.T) > 1.02 * printed.proportions.reach
+        outside = np.hypot(*points.T) > 1.02 * reach
         assert not ink[outside].any()
 
 

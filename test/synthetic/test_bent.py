@@ -18,7 +18,7 @@ from ahf_ros.synthetic.bent.light import drawn_light, surface_light
 from ahf_ros.synthetic.bent.picture import BentRendering, render_bent
 from ahf_ros.synthetic.bent.settings import BentSettings
 from ahf_ros.synthetic.bent.sheet import Sheet
-from ahf_ros.synthetic.covers import design
+from ahf_ros.synthetic.covers import ink_cover
 from support.square_markers import needs_square_markers
 
 SMALL = BentSettings(width=520, height=350, targets=6, sheets=6, dot_radius=8.0)
@@ -155,11 +155,11 @@ def test_outlines_hold_the_ink_that_the_other_maker_draws(name: str) -> None:
     printed = print_in(name).design
     number = printed.all_ids[2]
     hole = 0.1 if name.startswith(('metashape', 'aicon', 'cct1', 'dots')) else 0.0
-    other = design(printed, number, 0.0, 0.0, hole)
-    x, y = np.random.default_rng(3).uniform(-1, 1, (2, 200, 200)).astype(np.float32) * other.reach
-    outlines = contours(printed.ink(printed.word(number), hole))
-    here = inked(outlines, x.astype(float), y.astype(float))
-    there = other.cover(x, y, np.eye(2, dtype=np.float32) * np.float32(1e-3))
+    ink = printed.ink(printed.word(number), hole)
+    reach = printed.proportions.reach
+    x, y = np.random.default_rng(3).uniform(-1, 1, (2, 200, 200)).astype(np.float32) * reach
+    here = inked(contours(ink), x.astype(float), y.astype(float))
+    there = ink_cover(ink, 0.0)(x, y, np.eye(2, dtype=np.float32) * np.float32(1e-3))
     assert 0.02 < here.mean() < 0.98
     assert (here != (there > 0.5)).mean() < 0.005
 

@@ -13,9 +13,10 @@ from ahf_ros.cli import main
 from ahf_ros.codes.dots import dot_family
 from ahf_ros.codes.families import print_in
 from ahf_ros.codes.gsi import GSI_LIBRARY, point_family
+from ahf_ros.codes.ring import family
 from ahf_ros.interchange.truth_files import read_truth
 from ahf_ros.synthetic.camera import Camera, tilted_camera
-from ahf_ros.synthetic.covers import design
+from ahf_ros.synthetic.covers import ink_cover
 from ahf_ros.synthetic.prints import Mark, print_mark
 from ahf_ros.synthetic.scene import SceneSettings, render
 from support.square_markers import needs_square_markers
@@ -30,11 +31,12 @@ def camera(tilt: float = 0.0) -> Camera:
     return tilted_camera(400, 400, 2000.0, math.radians(tilt), 0.0, np.random.default_rng(1))
 
 
-def printed(family: str, number: int, turn: float, radius: float, looking: Camera) -> np.ndarray:
+def printed(name: str, number: int, turn: float, radius: float, looking: Camera) -> np.ndarray:
     """Return the ink in each pixel under even light."""
-    shown = design(print_in(family).design, number, turn, 0.0, 0.0)
+    design = print_in(name).design
+    cover = ink_cover(design.ink(design.word(number)), turn)
     image = np.zeros((400, 400), np.float32)
-    mark = Mark(np.zeros(2), radius, shown.reach, shown.cover)
+    mark = Mark(np.zeros(2), radius, design.proportions.reach, cover)
     print_mark(image, np.ones_like(image), mark, looking, 1.0, 0.7)
     return image
 
@@ -123,7 +125,7 @@ def ink_of(name: str, growth: float) -> np.ndarray:
     half = printed.proportions.reach + 0.5
     along = np.arange(-half, half, STEP, dtype=np.float32)
     x, y = np.meshgrid(along, along[::-1])
-    cover = design(printed, NUMBER, 0.4, growth, 0.0).cover
+    cover = ink_cover(printed.ink(printed.word(NUMBER)), 0.4, growth)
     return cover(x, y, np.eye(2, dtype=np.float32) * np.float32(STEP)) > 0.5
 
 
@@ -154,5 +156,5 @@ def test_the_same_growth_leaves_holes_that_are_smaller() -> None:
     near[0] = 0.05, 0.25
     jacobian = np.eye(2, dtype=np.float32) * np.float32(STEP)
     for growth, inked in ((0.0, [0, 0]), (0.1, [0, 1]), (0.35, [1, 1])):
-        cover = design(print_in('metashape12').design, 1, 0.0, growth, 0.3).cover
+        cover = ink_cover(family('metashape12').ink(71, pinhole=0.3), 0.0, growth)
         assert cover(near, near * 0, jacobian)[0].tolist() == inked
