@@ -6,6 +6,7 @@ does not know whether launch accepts the file: a test asks launch itself where i
 
 from __future__ import annotations
 
+import re
 import runpy
 import sys
 from collections.abc import Iterator
@@ -35,6 +36,9 @@ MODULES = {
 
 USERS = 'ahf_ros.nodes.launching'
 """The module that imports launch, apart from the launch files."""
+
+PROGRAMS = re.findall(r'_program (.*)\)', (ROOT / 'CMakeLists.txt').read_text())[0].split()
+"""What is installed for `ros2 run` and for launch."""
 
 
 class Entity:
@@ -138,7 +142,7 @@ def _process(entity: Entity, given: dict[str, str]) -> Started:
     assert type(entity).__name__ == 'Node'
     assert node['output'] == 'screen'
     assert type(node['on_exit']).__name__ == 'Shutdown'
-    assert node['package'] != 'ahf_ros' or (ROOT / 'scripts' / node['executable']).is_file()
+    assert node['package'] != 'ahf_ros' or node['executable'] in PROGRAMS
     arguments = []
     if space := node.get('namespace', ''):
         arguments += ['-r', f'__ns:=/{space.lstrip("/")}']
