@@ -46,6 +46,7 @@ def test_an_image_finds_the_calibration_of_its_time() -> None:
         known.at(25 * 10**9)
 
 
+@pytest.mark.lasting
 def test_targets_are_undistorted_where_camera_info_belongs_to_the_image(graph: Any) -> None:
     remapped = '-r', 'image:=/camera/image_raw', *overrides(undistort='true', family=SCENE.family)
     detector = DetectorProcess(graph, '/lens', *remapped, images='/camera/image_raw')

@@ -68,7 +68,7 @@ def run(*command: str, **environment: str) -> tuple[int, str]:
 
 @pytest.mark.parametrize(
     ('node', 'number'),
-    [('detector', 'SIGINT'), ('illumination', 'SIGTERM'), ('detector', 'SIGHUP')],
+    [('illumination', 'SIGTERM'), pytest.param('detector', 'SIGHUP', marks=pytest.mark.lasting)],
 )
 def test_a_signal_during_the_imports_ends_in_order(node: str, number: str) -> None:
     assert node in NODES
@@ -97,6 +97,7 @@ def test_what_ros_does_not_accept_is_told_in_a_line(arguments: list[str], reason
     assert reason in errors
 
 
+@pytest.mark.lasting
 def test_threads_that_go_on_in_the_middle_of_a_call_do_not_change_the_status() -> None:
     status, errors = run('-c', GOING_ON)
     assert (status, len(errors.splitlines())) == (1, 1), errors
@@ -121,6 +122,7 @@ def test_a_name_that_no_node_has_is_refused() -> None:
     assert (status, errors) == (1, f'accepted is the name of a node: {", ".join(NODES)}\n')
 
 
+@pytest.mark.lasting
 def test_the_end_does_not_wait_for_a_detector_of_another_package(
     graph: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -148,6 +150,7 @@ class MyDetector:
 """
 
 
+@pytest.mark.lasting
 def test_a_detector_of_another_package_does_not_end_the_node_without_a_word(
     graph: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -220,6 +220,7 @@ def test_what_is_wrong_is_said_and_nothing_is_published(
     assert not {number_of(it) for it in node.poses} & set(unknown)
 
 
+@pytest.mark.lasting
 def test_a_fisheye_camera_has_the_pose_that_it_has(graph: Any, tmp_path: Path) -> None:
     """Targets are imaged by the equidistant model; Brown's would be off by many pixels."""
     of = scene()
@@ -243,6 +244,7 @@ def test_a_fisheye_camera_has_the_pose_that_it_has(graph: Any, tmp_path: Path) -
     assert gap @ np.linalg.solve(covariance, gap) < 16
 
 
+@pytest.mark.lasting
 def test_rectified_images_need_no_k(graph: Any, tmp_path: Path) -> None:
     """As those of an Ensenso, whose k is the identity."""
     of = scene()
@@ -272,6 +274,7 @@ def test_the_other_matrix_of_camera_info_is_noticed(
     node.says(image, '/wrong/image_rect seems to be rectified, but camera_matrix is k')
 
 
+@pytest.mark.lasting
 def test_bad_parameters_end_the_node_with_the_reason(graph: Any, tmp_path: Path) -> None:
     file = coordinates(tmp_path / 'points.json', scene())
     status, errors = graph.start('pose', *overrides(coordinates=file, unit='m')).wait()

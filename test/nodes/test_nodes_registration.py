@@ -238,6 +238,7 @@ def test_bad_clouds_are_refused_and_their_scans_are_not(node: Registrar) -> None
     assert np.isnan(whole_points(node.clouds[-1])['x']).all()
 
 
+@pytest.mark.lasting
 def test_known_coordinates_give_the_frame(graph: Any, tmp_path: Path) -> None:
     rows = [
         f'{10 * group + it},{",".join(f"{1000 * value:.6f}" for value in point)}'
@@ -257,6 +258,7 @@ def test_known_coordinates_give_the_frame(graph: Any, tmp_path: Path) -> None:
         assert 'tf is True and the package tf2_msgs is not there: no tf' in text
 
 
+@pytest.mark.lasting
 def test_a_node_does_not_start_without_its_coordinates(graph: Any, tmp_path: Path) -> None:
     path = tmp_path / 'none.csv'
     process = graph.start('registration', '-p', f'coordinates:={path}')

@@ -28,6 +28,8 @@ from ahf_ros.nodes.pipeline import IN_A_ROW
 from ahf_ros.synthetic.scene import SceneSettings, render
 from support.detector import DetectorProcess, overrides, values
 
+pytestmark = pytest.mark.lasting
+
 SCENE = SceneSettings(width=200, height=150, targets=2, dot_radius=8.0, seed=4)
 
 

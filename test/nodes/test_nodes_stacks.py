@@ -17,6 +17,8 @@ from ahf_ros.nodes.settings import IlluminationNodeSettings
 from ahf_ros.synthetic.scene import SceneSettings, render
 from support.detector import DetectorProcess, overrides
 
+pytestmark = pytest.mark.lasting
+
 SCENE = SceneSettings(
     width=400, height=300, targets=4, dot_radius=10, light='stripe', ambient=0.02, phases=4
 )
