@@ -19,6 +19,8 @@ pytest.importorskip('reportlab', reason='PDF files are written by reportlab')
 pypdfium2 = pytest.importorskip('pypdfium2', reason='PDF files are rendered by pypdfium2')
 
 ROUND = (*VENDOR_NAMES, 'cct12', 'gsi', 'dots', 'cctag3', 'cctag4')
+SQUARE = [name for name in SQUARE_NAMES if not name.endswith(('_100', '_250', '_1000'))]
+"""Larger dictionaries begin with the same markers."""
 PER_FAMILY = 12
 
 
@@ -34,7 +36,7 @@ def rendered(file: Path, scale: float) -> list[np.ndarray]:
 
 @pytest.mark.parametrize(
     ('name', 'polarity'),
-    [*((name, 'dark') for name in (*ROUND, *SQUARE_NAMES)), *((name, 'bright') for name in ROUND)],
+    [*((name, 'dark') for name in (*ROUND, *SQUARE)), *((name, 'bright') for name in ROUND)],
 )
 def test_what_is_printed_is_identified_where_it_is(name: str, polarity: str) -> None:
     figures = identified(settings_of(name, polarity, sample(name, PER_FAMILY), page='A6'))
