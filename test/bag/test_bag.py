@@ -7,6 +7,7 @@ import subprocess
 import sys
 import time
 from contextlib import closing
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -19,9 +20,8 @@ from rosbags import rosbag2
 
 from ahf_ros.bag import output, run
 from ahf_ros.bag.definitions import COMPRESSED_IMAGE, IMAGE, typestore
-from ahf_ros.cli import main
 from ahf_ros.synthetic.scene import Rendering, SceneSettings, render
-from support import bags, mcap
+from support import bags, command_line, mcap
 
 ROOT = Path(__file__).resolve().parents[2]
 PATIENCE = 300.0
@@ -41,12 +41,7 @@ sys.exit(main())
 """The command `ahf`, which answers all images of a bag and then waits to be killed."""
 
 
-def status(*arguments: object) -> int:
-    """Return the exit status of `ahf bag` in this process."""
-    try:
-        return main(['bag', *map(str, arguments)])
-    except SystemExit as left:
-        return int(left.code or 0)
+status = partial(command_line.status, 'bag')
 
 
 @pytest.fixture(scope='module')

@@ -8,6 +8,7 @@ import sqlite3
 from collections import Counter
 from collections.abc import Callable
 from contextlib import closing
+from functools import partial
 from pathlib import Path
 from zlib import crc32
 
@@ -30,21 +31,13 @@ from ahf_ros.bag.definitions import COMPRESSED_IMAGE, IMAGE, MAXIMUM_DEFINITION,
 from ahf_ros.bag.mcap_records import add_checksums
 from ahf_ros.bag.output import Journal
 from ahf_ros.bag.source import Source
-from ahf_ros.cli import main
-from support import bags, mcap
+from support import bags, command_line, mcap
 
 COUNT = 3
 PIXELS = [np.tile(np.arange(50, dtype=np.uint8) + number, (40, 1)) for number in range(COUNT)]
 
 
-def status(*arguments: object) -> int:
-    """Return the exit status of `ahf bag` in this process."""
-    try:
-        return main(['bag', *map(str, arguments), '--detector', 'traditional'])
-    except SystemExit as left:
-        return int(left.code or 0)
-
-
+status = partial(command_line.status, 'bag', '--detector', 'traditional')
 Run = Callable[[Path, int], str]
 
 
@@ -227,16 +220,12 @@ def test_names_may_have_any_letters(
 
 @pytest.mark.parametrize('harm', [Path.unlink, lambda it: it.write_bytes(it.read_bytes()[:200])])
 def test_a_finished_bag_without_its_data_is_not_done(
-    tmp_path: Path,
-    harm: Callable[[Path], object],
-    capfd: pytest.CaptureFixture[str],
+    tmp_path: Path, harm: Callable[[Path], object], run: Run
 ) -> None:
     source = recorded(tmp_path)
-    target = tmp_path / 'out'
-    assert status(source, target) == 0
-    harm(target / 'out.mcap')
-    assert status(source, target) == 1
-    assert f'{target} was finished and is damaged: ' in capfd.readouterr().err
+    run(source, 0)
+    harm(tmp_path / 'out' / 'out.mcap')
+    assert f'{tmp_path / "out"} was finished and is damaged: ' in run(source, 1)
 
 
 def test_a_bag_that_shrinks_while_it_is_answered_keeps_its_answers(
@@ -376,23 +365,16 @@ def test_channels_of_other_kinds_are_named_as_left_out(tmp_path: Path, run: Run)
     assert counts(tmp_path / 'out') == {'/image': 3, '/image/coded_targets': 3}
 
 
-def test_a_file_that_the_metadata_do_not_list_is_named(
-    tmp_path: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_a_file_that_the_metadata_do_not_list_is_named(tmp_path: Path, run: Run) -> None:
     source = recorded(tmp_path)
     mcap.McapFile().write(source / 'more.mcap')
-    assert status(source, tmp_path / 'out') == 0
-    named = 'left out: more.mcap, which metadata.yaml does not list'
-    assert named in capfd.readouterr().err
+    assert 'left out: more.mcap, which metadata.yaml does not list' in run(source, 0)
 
 
-def test_messages_of_ros1_in_mcap_are_named(
-    tmp_path: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_messages_of_ros1_in_mcap_are_named(tmp_path: Path, run: Run) -> None:
     records = [mcap.schema(1, IMAGE, 'ros1msg', ''), mcap.channel(1, 1, '/image', 'ros1')]
-    source = mcap.McapFile(records, 'ros1').write(tmp_path / 'in.mcap')
-    assert status(source, tmp_path / 'out') == 1
-    assert 'in.mcap has no images' in (errors := capfd.readouterr().err)
+    errors = run(mcap.McapFile(records, 'ros1').write(tmp_path / 'in.mcap'), 1)
+    assert 'in.mcap has no images' in errors
     assert '/image is serialized as ros1' in errors
 
 
