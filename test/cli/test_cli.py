@@ -24,7 +24,7 @@ from support.command_line import ahf, status
 SCENE = ['--width', '640', '--height', '480', '--targets', '6', '--dot-radius', '10']
 KEYS = (
     'image width height upright family looked_for detector expected estimated expected_ids '
-    'mirrored edge_shift codes targets repeated unsettled filter search elapsed_s',
+    'mirrored edge_shift codes reach targets repeated unsettled filter search elapsed_s',
     'id code x y semi_major semi_minor angle confidence covariance family '
     'edge_shift polarity bits',
     'applied gamma_high gamma_low cutoff attenuation evaluations generations log_offset '
