@@ -26,19 +26,11 @@ from ahf_ros.codes.families import FAMILY_NAMES
 from ahf_ros.detectors import DETECTOR_NAMES
 from ahf_ros.evaluation import total
 from ahf_ros.synthetic.bent.picture import render_bent
-from ahf_ros.synthetic.bent.settings import BentSettings
 from benchmarks import report
-from benchmarks.limits import DOT_SHARES
 from benchmarks.report import number
 from benchmarks.rows import Case, Scene, Seen, detector, measured
 from support.calls import calls_of
-
-_PATTERNS = ('stripe', 'fine_stripe', 'lattice', 'dense_lattice')
-LIGHTS = ('normal 0.3', *(f'{name} {ambient}' for ambient in (0.3, 0.12) for name in _PATTERNS))
-"""Patterns and their ambient light."""
-
-WIDTH, HEIGHT = 1920, 1280
-"""Of the pictures, px."""
+from support.pictures.bent import LIGHTS, settings
 
 TARGETS = 54
 """In a picture."""
@@ -46,50 +38,8 @@ TARGETS = 54
 FAR = 4.0
 """Standard deviations beyond which a centre is counted."""
 
-_RANGES: dict[str, tuple[float, float]] = {
-    'motion': (0.5, 2.0),
-    'confusion': (0.2, 1.0),
-    'gloss': (0.02, 0.06),
-    'roughness': (0.2, 0.6),
-    'grain': (0.0, 0.1),
-    'ragged': (0.0, 0.04),
-    'texture': (0.01, 0.04),
-    'distortion': (-0.2, 0.1),
-    'tangential_1': (-0.005, 0.005),
-    'tangential_2': (-0.005, 0.005),
-    'vignetting': (0.1, 0.6),
-    'black': (0.03, 0.1),
-    'exposure': (150.0, 230.0),
-    'full_well': (4000.0, 15000.0),
-}
-"""What is drawn for each seed."""
-
-
 POLARITIES = ('dark', 'bright')
 """Of targets."""
-
-
-def settings(
-    family: str, polarity: str, light: str, radius: float, seed: int, targets: int
-) -> BentSettings:
-    """Return the picture of a polarity, a light of `LIGHTS`, a radius in px and a seed."""
-    generator = np.random.default_rng(seed)
-    drawn = {name: float(generator.uniform(*of)) for name, of in _RANGES.items()}
-    pattern, ambient = light.split()
-    share = DOT_SHARES.get(family, 1.0)
-    return BentSettings(
-        width=WIDTH,
-        height=HEIGHT,
-        targets=targets,
-        family=family,
-        polarity=polarity,
-        dot_radius=radius * share,
-        printed_radius=BentSettings().printed_radius * share,
-        light=pattern,
-        ambient=float(ambient),
-        seed=seed,
-        **drawn,
-    )
 
 
 def case(family: str, polarity: str, light: str, radius: float, targets: int = TARGETS) -> Case:

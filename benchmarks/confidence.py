@@ -1,32 +1,72 @@
-"""How far the confidence of ring targets can be trusted, and the weights that it rests on.
+"""How far stated confidences can be trusted, and the weights that they rest on.
 
-Scenes under every condition of `benchmarks.conditions` are rendered, and every plausible reading
-of the ring detector is compared with the truth. The table shows the reliability of the weights in
-force by condition. With --fit, a logistic regression is fitted to the readings instead, and
-written to the file of fitted weights. Seeds from 101 on are for tests, those below for
-development.
+Scenes under every condition are rendered (`support.pictures.conditions`, for `gsi` and `dots`
+`support.pictures.dot_conditions`), and every plausible reading is compared with the truth. The
+table shows the reliability of the weights in force by condition. With --fit, logistic regressions
+are fitted to the readings instead, and written to the file of fitted weights. Seeds from 101 on
+are for tests, those below for development.
 
-    python -m benchmarks.confidence [--seeds 101 102]
-    python -m benchmarks.confidence --fit 1 2 3
+    python -m benchmarks.confidence [--family ring] [--seeds 101 102]
+    python -m benchmarks.confidence --family gsi --fit 1 2 3 4
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import json
+import os
+import re
+import subprocess
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from functools import partial
+from itertools import pairwise
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import NamedTuple
 
 import numpy as np
 
+from ahf_ros.codes.dots import dot_family
+from ahf_ros.codes.gsi import point_family
 from ahf_ros.codes.ring import Family, canonical
-from ahf_ros.detectors.ring.confidence import WEIGHTS, confidence, features
+from ahf_ros.detectors import DetectorSettings
+from ahf_ros.detectors.dots import rings as dots
+from ahf_ros.detectors.dots.detector import find_rings
+from ahf_ros.detectors.gsi import hypotheses as gsi
+from ahf_ros.detectors.gsi.detector import find_hypotheses as find_gsi_hypotheses
+from ahf_ros.detectors.ring import confidence as ring
 from ahf_ros.detectors.ring.contests import overlapping
 from ahf_ros.detectors.ring.detector import find_hypotheses
 from ahf_ros.detectors.ring.hypotheses import Hypotheses
+from ahf_ros.features.pyramid import image_pyramid
 from ahf_ros.imaging.image import as_gray
-from benchmarks.conditions import COMMON, FOREIGN, Scene, scenes
-from benchmarks.reliability import NEAR, Parts, gathered, reliability_table, run
+from ahf_ros.synthetic.scene import Rendering, render
+from ahf_ros.target import Target
+from benchmarks import report
+from support.pictures.conditions import COMMON, FOREIGN, Scene, scenes
+from support.pictures.dot_conditions import dots_scenes, gsi_scenes, with_covered_dots
+from support.pictures.textures import lookalikes, rough_image
+
+NEAR = 5.0
+"""Largest distance of a target from its truth, px."""
+
+CLASSES = (0.0, 0.5, 0.9, 0.95, 0.98, 0.99, 0.999, 1.0)
+"""Bounds of the classes of confidence in the table."""
 
 COVERED = ('cover', 'cover like paper', 'another target')
 """Conditions under which something lies on targets."""
+
+COVERED_DOTS = 2
+"""Targets of GSI in a scene that lack a decoding dot."""
+
+TEXTURES = 6
+"""Textured images of a seed, which show no target of GSI."""
+
+SIGNS = np.array([1, 1, 1, -1, -1, -1, 1])
+"""Of GSI's weights: support, weakest dot, margin and edges that were found speak for a target."""
+
+LOOKALIKES = 40
+"""Images of rings of dots that are no targets, for each seed."""
 
 MARGIN, CODED = 0, 1
 """Places of some features."""
@@ -40,8 +80,69 @@ _NO_SPREAD = 1e-9
 _MINIMUM_MARGIN = np.log1p(2.0)  # of readings that count: others are not certain in any case
 _HIDDEN, _TRACE = 0.03, -1.4  # share of the band, and feature of arcs, without a trace of covers
 
+Parts = Iterator[tuple[np.ndarray, ...]]
+"""Conditions, features and what is right of the readings of one image after the other."""
 
-def readings(seed: int) -> Parts:
+
+class Kind(NamedTuple):
+    """How the confidences of a family are looked at, and how their weights are fitted.
+
+    Attributes
+    ----------
+    weights : Path
+        The file of fitted weights, in which the set is called `NAME_confidence`, or `confidence`.
+    readings : callable
+        Yields what is read in the scenes of a seed, in columns: the conditions come first, what is
+        right last but for rings, whose covers follow.
+    stated, fitted : callable
+        Return the confidence of readings, and weights that suit them.
+    """
+
+    weights: Path
+    readings: Callable[[int], Parts]
+    stated: Callable[..., np.ndarray]
+    fitted: Callable[..., dict[str, np.ndarray]]
+
+
+def gathered(readings: Callable[[int], Parts], seeds: Sequence[int]) -> tuple[np.ndarray, ...]:
+    """Return the readings of the scenes of some seeds, joined; each seed has a process."""
+    with ProcessPoolExecutor(min(len(seeds), os.cpu_count() or 1)) as pool:
+        parts = [part for of in pool.map(partial(_listed, readings), seeds) for part in of]
+    return tuple(np.concatenate(column) for column in zip(*parts, strict=True))
+
+
+def _listed(readings: Callable[[int], Parts], seed: int) -> list[tuple[np.ndarray, ...]]:
+    return list(readings(seed))
+
+
+def reliability_table(
+    condition: Sequence[str] | np.ndarray, stated: np.ndarray, right: np.ndarray
+) -> list[str]:
+    """Return the lines of the table of confidences and how often they are right.
+
+    Parameters
+    ----------
+    condition : sequence of k str
+        Under which each reading was made; 'all' stands for all of them at the end.
+    stated : ndarray of float, shape (k,)
+        Their confidence.
+    right : ndarray of bool, shape (k,)
+    """
+    condition = np.asarray(condition)
+    rows = []
+    for name in (*dict.fromkeys(condition.tolist()), 'all'):
+        here = (condition == name) | (name == 'all')
+        for low, high in pairwise(CLASSES):
+            within = here & (stated >= low) & ((stated < high) | (high == CLASSES[-1]))
+            if within.any():
+                shares = (f'{of[within].mean():.4f}' for of in (stated, right))
+                rows.append((name, f'{low} to {high}', within.sum(), *shares))
+    return report.table(
+        ('condition', 'confidence', 'readings', 'mean confidence', 'share right'), rows
+    )
+
+
+def ring_readings(seed: int) -> Parts:
     """Yield condition, features, rightness and covers of all plausible readings of each scene."""
     return map(readings_of, scenes(seed))
 
@@ -63,7 +164,7 @@ def readings_of(scene: Scene) -> tuple[np.ndarray, ...]:
     seen &= right | ~_below_right_ones(read, right)
     seen &= ~near[:, asked == 0].any(axis=1)
     condition = np.full(seen.sum(), scene.condition)
-    return condition, features(read.select(seen)), right[seen], read.hidden[seen]
+    return condition, ring.features(read.select(seen)), right[seen], read.hidden[seen]
 
 
 def _below_right_ones(read: Hypotheses, right: np.ndarray) -> np.ndarray:
@@ -109,23 +210,172 @@ def rising_regression(
     return weights[0] - slopes @ mean, slopes
 
 
-def fitted(seeds: Sequence[int]) -> dict[str, np.ndarray]:
-    """Return the numbers of the regression on the scenes of some seeds, by their names."""
-    condition, values, right, hidden = gathered(readings, seeds)
-    # A cover without a trace cannot be told.
+def fitted_to_rings(
+    condition: np.ndarray, values: np.ndarray, right: np.ndarray, hidden: np.ndarray
+) -> dict[str, np.ndarray]:
+    """Return the weights of rings; a cover without a trace cannot be told from the print."""
     no_trace = ~right & np.isin(condition, COVERED) & (hidden < _HIDDEN)
     no_trace &= values[:, CODED] > _TRACE
-    told = (values[:, MARGIN] > _MINIMUM_MARGIN) & ~no_trace
-    counts = np.where(np.isin(condition, COMMON + FOREIGN), 1.0, RARE)[told]
-    intercept, weights = rising_regression(values[told], right[told], counts)
+    used = (values[:, MARGIN] > _MINIMUM_MARGIN) & ~no_trace
+    counts = np.where(np.isin(condition, COMMON + FOREIGN), 1.0, RARE)[used]
+    intercept, weights = rising_regression(values[used], right[used], counts)
     return {'intercept': np.round([intercept], 3), 'weights': np.round(weights, 3)}
 
 
-def reliability(seeds: Sequence[int]) -> list[str]:
-    """Return the lines of the table of the scenes of some seeds."""
-    condition, values, right, _ = gathered(readings, seeds)
-    return reliability_table(condition, confidence(values), right)
+def _gsi_hypotheses(scene: Rendering) -> tuple[np.ndarray, np.ndarray]:
+    """Return the features of all hypotheses, and which are right."""
+    image, covered = with_covered_dots(scene, COVERED_DOTS)
+    found = _found_in(image)
+    x, y = (found.homographies[:, :2, 2] / found.homographies[:, 2:, 2]).T
+    right = np.zeros(len(found.words), bool)
+    for target in scene.targets:
+        if target.id not in covered:
+            near = np.hypot(x - target.x, y - target.y) < NEAR
+            right |= near & (found.words == target.code)
+    return found.features, right
+
+
+def _found_in(image: np.ndarray) -> gsi.Hypotheses:
+    """Return the hypotheses of the detector."""
+    settings = DetectorSettings(family='gsi')
+    pyramid = image_pyramid(image, settings.max_radius)
+    return find_gsi_hypotheses(pyramid, settings, point_family())[0]
+
+
+def gsi_readings(seed: int) -> Parts:
+    """Yield condition, features and rightness of the hypotheses of each image."""
+    with TemporaryDirectory() as folder:
+        for condition, settings in gsi_scenes(seed, Path(folder)):
+            features, right = _gsi_hypotheses(render(settings))
+            yield np.full(len(right), condition), features, right
+    for number in range(TEXTURES):
+        features = _found_in(rough_image(100 * seed + number)).features
+        yield np.full(len(features), 'no targets'), features, np.zeros(len(features), bool)
+
+
+def fitted_to_gsi(_: np.ndarray, features: np.ndarray, right: np.ndarray) -> dict[str, np.ndarray]:
+    """Return the weights of GSI's targets, of which the first one is the intercept."""
+    intercept, slopes = rising_regression(SIGNS * features, right, np.ones(len(right)))
+    return {'weights': np.round(np.append(intercept, SIGNS * slopes), 3) + 0.0}
+
+
+def dots_readings(seed: int) -> Parts:
+    """Yield the plausible readings of each image: condition, features, of a target or not, right.
+
+    There are features of a reading as that of a target, and as that of a word.
+    """
+    for condition, settings in dots_scenes(seed):
+        scene = render(settings)
+        yield _compared(condition, scene.image, scene.targets if settings.family == 'dots' else ())
+    for image in map(lookalikes, range(LOOKALIKES * seed, LOOKALIKES * (seed + 1))):
+        yield _compared('lookalikes', image, ())
+
+
+def _compared(
+    condition: str, image: np.ndarray, targets: Sequence[Target]
+) -> tuple[np.ndarray, ...]:
+    settings, code = DetectorSettings(family='dots'), dot_family()
+    pyramid = image_pyramid(as_gray(image), settings.max_radius)
+    rings = find_rings(pyramid, settings, code)
+    x, y, true = np.array([(it.x, it.y, it.id) for it in targets]).reshape(-1, 3).T
+    near = np.hypot(rings.frames[:, :1, 2] - x, rings.frames[:, 1:2, 2] - y) < NEAR
+    right = (near & (code.ids(rings.words)[:, None] == true)).any(axis=1)
+    features = rings.target_features, rings.word_features
+    return np.full(len(right), condition), *features, near.any(axis=1), right
+
+
+def stated_of_dots(
+    _: np.ndarray, of_targets: np.ndarray, of_words: np.ndarray, *__: np.ndarray
+) -> np.ndarray:
+    """Return the confidence of readings of rings of dots."""
+    return dots.target_probability(of_targets) * dots.word_probability(of_words)
+
+
+def fitted_to_dots(
+    _: np.ndarray,
+    of_targets: np.ndarray,
+    of_words: np.ndarray,
+    shown: np.ndarray,
+    right: np.ndarray,
+) -> dict[str, np.ndarray]:
+    """Return the weights of both regressions of rings of dots."""
+    return {
+        'target': np.round(logistic_regression(of_targets, shown), 2),
+        'word': np.round(logistic_regression(of_words[shown], right[shown]), 2),
+    }
+
+
+def logistic_regression(features: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """Return intercept and weights with the highest likelihood, under a weak prior."""
+    mean, spread = features.mean(axis=0), features.std(axis=0)
+    basis = np.column_stack([np.ones(len(features)), (features - mean) / spread])
+    prior = np.diag([0.0] + [1.0] * features.shape[1])
+    weights = np.zeros(basis.shape[1])
+    for _ in range(100):
+        probability = 1 / (1 + np.exp(-basis @ weights))
+        gradient = basis.T @ (probability - right) + prior @ weights
+        curvature = (basis.T * (probability * (1 - probability))) @ basis + prior
+        weights -= np.linalg.solve(curvature, gradient)
+    slopes = weights[1:] / spread
+    return np.concatenate([[weights[0] - slopes @ mean], slopes])
+
+
+KINDS = {
+    'ring': Kind(
+        ring.WEIGHTS,
+        ring_readings,
+        lambda _, values, *__: ring.confidence(values),
+        fitted_to_rings,
+    ),
+    'gsi': Kind(
+        gsi.WEIGHTS, gsi_readings, lambda _, values, __: gsi.probability(values), fitted_to_gsi
+    ),
+    'dots': Kind(dots.WEIGHTS, dots_readings, stated_of_dots, fitted_to_dots),
+}
+"""The families with fitted confidences."""
+
+
+def reliability(family: str, seeds: Sequence[int]) -> list[str]:
+    """Return the lines of the table of a family, on the scenes of some seeds."""
+    kind = KINDS[family]
+    columns = gathered(kind.readings, seeds)
+    right = columns[2] if family == 'ring' else columns[-1]
+    return reliability_table(columns[0], kind.stated(*columns), right)
+
+
+def write_weights(
+    family: str, seeds: Sequence[int], weights: Mapping[str, np.ndarray], path: Path
+) -> None:
+    """Replace one set of a file, and say from which seeds and at which commit it was fitted."""
+    sets = json.loads(path.read_text(encoding='utf-8'))
+    command = ['git', 'describe', '--always', '--dirty']
+    commit = subprocess.run(command, cwd=path.parent, check=True, capture_output=True, text=True)
+    sets['confidence' if family == 'ring' else f'{family}_confidence'].update(
+        command=f'python -m benchmarks.confidence --family {family} '
+        f'--fit {" ".join(map(str, seeds))}',
+        seeds=list(seeds),
+        commit=commit.stdout.strip(),
+        **{name: values.tolist() for name, values in weights.items()},
+    )
+    text = json.dumps(sets, indent=2)
+    text = re.sub(r'\[\s+([^]]*?)\s+\]', lambda row: f'[{" ".join(row[1].split())}]', text)
+    path.write_text(text + '\n', encoding='utf-8')
+    print(f'{path}: weights of {family}')
+
+
+def main() -> None:
+    """Write weights with --fit, or print their reliability as Markdown."""
+    made = report.parser(__doc__)
+    made.add_argument('--family', choices=KINDS, default='ring')
+    made.add_argument('--fit', type=int, nargs='+', metavar='SEED', help='fit the weights anew')
+    options = report.parsed(made)
+    if options.fit:
+        kind = KINDS[options.family]
+        weights = kind.fitted(*gathered(kind.readings, options.fit))
+        write_weights(options.family, options.fit, weights, kind.weights)
+    else:
+        print('\n'.join(reliability(options.family, options.seeds)))
 
 
 if __name__ == '__main__':
-    run('confidence', __doc__, fitted, reliability, WEIGHTS)
+    main()

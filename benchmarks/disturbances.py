@@ -31,12 +31,12 @@ from ahf_ros.interchange.image_files import read_image
 from ahf_ros.interchange.truth_files import read_truth
 from ahf_ros.target import Target, TrueTarget
 from benchmarks import report
-from benchmarks.disturbed import Scene, Targets
-from benchmarks.exposure import Exposure
-from benchmarks.lookalikes import LOOKALIKES, other_words
 from benchmarks.report import FIRST_TEST_SEED, progress, table
-from benchmarks.sheets import COLUMNS, ROWS, mark_sheet
 from support import PHOTOS
+from support.pictures.disturbed import Scene, Targets
+from support.pictures.exposure import Exposure
+from support.pictures.lookalikes import LOOKALIKES, other_words
+from support.pictures.sheets import COLUMNS, ROWS, mark_sheet
 
 LOOKALIKE_COUNT = 180
 """Marks of each kind that are no targets; 6,480 of all but clutter in the usual families."""

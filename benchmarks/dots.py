@@ -22,11 +22,12 @@ import numpy as np
 from ahf_ros.detectors import create_detector
 from ahf_ros.synthetic.scene import SceneSettings, render
 from benchmarks import report
-from benchmarks.dots_confidence import PER_RADIUS, reliability
+from benchmarks.confidence import reliability
 from benchmarks.report import number, table
 from benchmarks.rows import detector, measured, rendered
 from benchmarks.speed import in_turns
-from benchmarks.textures import SIZE, lookalikes, textured_image
+from support.pictures.dot_conditions import PER_RADIUS
+from support.pictures.textures import SIZE, lookalikes, textured_image
 
 METHODS = (
     ('dots', False),
@@ -175,7 +176,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         figures['textures'] = reports(textured_image, TEXTURES)
         figures['lookalikes'] = reports(lookalikes, LOOKALIKES)
     if 'confidence' in options.parts:
-        figures['confidence'] = reliability(seeds[:1])
+        figures['confidence'] = reliability('dots', seeds[:1])
     report.publish(figures, markdown(figures), options)
 
 

@@ -18,9 +18,6 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
-import cv2
-import numpy as np
-
 from ahf_ros.detectors import create_detector
 from ahf_ros.evaluation import score
 from ahf_ros.interchange.image_files import read_image
@@ -29,8 +26,8 @@ from benchmarks import report
 from benchmarks.report import number, table
 from benchmarks.rows import Case, Row, Scene, detector, measured, rendered
 from benchmarks.speed import in_turns
-from benchmarks.textures import dot_grid
 from support import PHOTOS
+from support.pictures.textures import dot_grid, rough_image
 
 PAPER = SceneSettings(
     family='gsi',
@@ -56,16 +53,6 @@ DRIVEN = {
 }
 
 
-def texture(seed: int) -> Scene:
-    """Return noise of all wavelengths, with edges of any strength."""
-    generator = np.random.default_rng(seed)
-    image = np.zeros((1200, 1600))
-    for width in (1, 2, 4, 8, 16):
-        noise = cv2.GaussianBlur(generator.normal(size=image.shape), (0, 0), width)
-        image += np.where(noise > noise.std(), 1.0, 0.0) * generator.uniform(0.3, 1)
-    return (40 + 200 * image / image.max()).astype(np.uint8), ()
-
-
 def without_targets() -> Iterator[Case]:
     """Yield images that show no target of GSI."""
 
@@ -78,7 +65,9 @@ def without_targets() -> Iterator[Case]:
         yield rendered('no targets', f'{light} 0.3', scene)
     yield rendered('no targets', '100 distractors', replace(LARGE, targets=0, distractors=100))
     for count in range(10):
-        yield case(f'texture {count}', lambda seed, count=count: texture(100 * seed + count))
+        yield case(
+            f'texture {count}', lambda seed, count=count: (rough_image(100 * seed + count), ())
+        )
     for path in sorted((PHOTOS / 'panel').glob('*.png')):
         yield case(f'photograph {path.stem}', lambda _, path=path: (read_image(path), ()))
 

@@ -30,6 +30,7 @@ from ahf_ros.synthetic.scene import SceneSettings, render
 from benchmarks import report
 from benchmarks.report import number
 from benchmarks.rows import Case, Scene, detector, measured
+from support.pictures.bent import DOT_SHARES
 
 _VIEWS: dict[str, dict[str, Any]] = {
     'radius 20, 0.04': {'ambient': 0.04},
@@ -97,9 +98,6 @@ SETTINGS: dict[str, dict[str, Any]] = {
     },
 }
 """Settings of the renderer; nothing in the package was fitted to `other` and `strange`."""
-
-DOT_SHARES = {'gsi': 0.5, 'dots': 0.7}
-"""Radius of the dot over that of a ring target of about the same size."""
 
 
 def scene(options: argparse.Namespace, row: str, light: str, seed: int) -> SceneSettings:

@@ -1,7 +1,7 @@
 """How often what is read at a stated confidence is right, on four makers of pictures.
 
-Rendered scenes of `benchmarks.conditions`, by this package, by the second maker of bent sheets,
-and with the processing of a phone; and photographs by strangers, whose truth is that of
+Rendered scenes of `support.pictures.conditions`, by this package, by the second maker of bent
+sheets, and with the processing of a phone; and photographs by strangers, whose truth is that of
 `benchmarks.photographs`. Readings of rings count from a confidence of 0.5 on, reported or not; of
 other families, rendered in all lights of `benchmarks.bent` by the first two makers, those that
 are reported. The expected number is the sum of their confidences.
@@ -28,11 +28,11 @@ from ahf_ros.detectors.ring.confidence import confidence
 from ahf_ros.evaluation import RIGHT, judge
 from ahf_ros.synthetic.bent.picture import render_bent
 from ahf_ros.synthetic.scene import SceneSettings, render
-from benchmarks import bent, report
-from benchmarks.conditions import Scene, lit, photographed, sheets_bent, small
+from benchmarks import report
 from benchmarks.confidence import readings_of
-from benchmarks.limits import DOT_SHARES
 from benchmarks.photographs import TRUTH, photographs, picture, targets_of
+from support.pictures.bent import DOT_SHARES, HEIGHT, LIGHTS, WIDTH, settings
+from support.pictures.conditions import Scene, lit, photographed, sheets_bent, small
 
 BOUNDS = (0.5, 0.7, 0.9, 0.97, 1.0)
 """Of the classes of confidence."""
@@ -76,11 +76,11 @@ def strangers(folder: Path) -> Iterator[Readings]:
 
 def others(seed: int) -> Iterator[Readings]:
     """Yield what is reported of families beside rings, by both makers."""
-    for family, light in product(FAMILIES, bent.LIGHTS):
+    for family, light in product(FAMILIES, LIGHTS):
         pattern, ambient = light.split()
         plain = SceneSettings(
-            width=bent.WIDTH,
-            height=bent.HEIGHT,
+            width=WIDTH,
+            height=HEIGHT,
             targets=24,
             family=family,
             dot_radius=RADIUS * DOT_SHARES.get(family, 1.0),
@@ -88,7 +88,7 @@ def others(seed: int) -> Iterator[Readings]:
             ambient=float(ambient),
             seed=seed,
         )
-        sheets = bent.settings(family, 'dark', light, RADIUS, seed, plain.targets)
+        sheets = settings(family, 'dark', light, RADIUS, seed, plain.targets)
         for maker, scene in (
             ('this package', render(plain)),
             ('bent sheets', render_bent(sheets)),

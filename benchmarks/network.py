@@ -1,50 +1,87 @@
-"""Figures of networks: adjustment, covariances, wrong IDs, and other programs beside it.
+"""Figures of networks: adjustment, covariances, wrong IDs, movements and time.
 
     python -m benchmarks.network --table TABLE [--seed 301] [--runs N]
 
-`camcal` needs `AHF_NETWORKS`, the folder of published networks, `panel` needs `AHF_PHOTOS`, that
-of photographs, and `colmap` needs pycolmap.
+`camcal` needs `AHF_NETWORKS`, the folder of published networks, and `panel` needs `AHF_PHOTOS`,
+that of photographs.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import resource
+import time
+from collections.abc import Callable, Sequence
 
-from benchmarks import (
-    network_camcal,
-    network_colmap,
-    network_ellipsoids,
-    network_epochs,
-    network_optimum,
-    network_outliers,
-    network_scale,
-    network_starts,
-    network_trust,
-)
+import numpy as np
+
+from ahf_ros.orientation.adjustment import adjust
+from ahf_ros.orientation.orient import orient
+from benchmarks import network_camcal, network_epochs, network_errors, network_starts
 from benchmarks.report import print_chosen
+from benchmarks.report import table as markdown
+from support.network_scenes import Field, approximate, simulate
+
+SIZES = (125, 250, 500, 1000)
+"""Photographs of large networks."""
+
+
+def scale_table(seeds: Sequence[int]) -> list[str]:
+    """Return times of 200 targets, 80 in a photograph, as lines of Markdown."""
+    lines = [
+        '| photographs | observations | parameters given, no tests, s | all and tests, s '
+        '| memory MB |',
+        '|---|---|---|---|---|',
+    ]
+    for photographs in SIZES:
+        random = np.random.default_rng([seeds[0], photographs])
+        network, truth = simulate(Field(photographs, 200, each=80), random)
+        start = approximate(truth, random)
+        begin = time.perf_counter()
+        adjust(network, start, release=network_errors.RELEASED, test=False)
+        between = time.perf_counter()
+        adjust(network, start)
+        end = time.perf_counter()
+        memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+        lines.append(
+            f'| {photographs} | {len(network.observations.xy)} | {between - begin:.1f} '
+            f'| {end - between:.1f} | {memory:.0f} |'
+        )
+    return lines
+
+
+def from_ids(seeds: Sequence[int]) -> list[str]:
+    """Return the processor time of photographs that all show 200 targets, from IDs alone."""
+    field = Field(300, 200)
+    network, _ = simulate(field, np.random.default_rng([seeds[0], field.photographs]))
+    begin = time.process_time()
+    (solution,) = orient(network)
+    taken = time.process_time() - begin
+    counts = (
+        field.photographs,
+        field.targets,
+        len(network.observations.xy),
+        solution.oriented.sum(),
+    )
+    head = 'photographs', 'targets', 'image points', 'oriented', 'sigma0', 'processor, s'
+    return markdown(head, [(*counts, f'{solution.sigma0:.3f}', f'{taken:.0f}')])
+
 
 TABLES: dict[str, Callable[[int, int | None], list[str]]] = {
     'camcal': lambda seed, runs: network_camcal.table(),
-    'ellipsoids': lambda seed, runs: network_ellipsoids.table([seed], runs or 125),
+    'ellipsoids': lambda seed, runs: network_errors.ellipsoids_table([seed], runs or 125),
     'epochs': lambda seed, runs: network_epochs.table([seed], runs or network_epochs.RUNS),
-    'optimum': lambda seed, runs: network_optimum.table([seed], runs or 20000),
-    'outliers': lambda seed, runs: network_outliers.table([seed], runs or 25),
-    'scale': lambda seed, runs: network_scale.table([seed]),
-    'from_ids': lambda seed, runs: network_scale.from_ids([seed]),
+    'optimum': lambda seed, runs: network_epochs.optimum_table([seed], runs or 20000),
+    'outliers': lambda seed, runs: network_errors.outliers_table([seed], runs or 25),
+    'scale': lambda seed, runs: scale_table([seed]),
+    'from_ids': lambda seed, runs: from_ids([seed]),
     'panel': lambda seed, runs: network_starts.panel(),
-    'lenses': lambda seed, runs: network_trust.lenses_table([seed], runs or 250),
-    'still': lambda seed, runs: network_trust.still_table([seed], runs or 400),
-    'tails': lambda seed, runs: network_trust.tails_table([seed], runs or 1000),
-    'told': lambda seed, runs: network_trust.told_table([seed], runs or 500),
+    'lenses': lambda seed, runs: network_errors.lenses_table([seed], runs or 250),
+    'still': lambda seed, runs: network_errors.still_table([seed], runs or 400),
+    'tails': lambda seed, runs: network_errors.tails_table([seed], runs or 1000),
+    'told': lambda seed, runs: network_errors.told_table([seed], runs or 500),
     'starts': lambda seed, runs: network_starts.starts_table([seed], runs or 250),
-    'colmap': lambda seed, runs: network_colmap.table([seed]),
 }
 
 
-def main() -> None:
-    """Print the chosen table."""
-    print_chosen(TABLES, __doc__)
-
-
 if __name__ == '__main__':
-    main()
+    print_chosen(TABLES, __doc__)

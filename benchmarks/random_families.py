@@ -8,59 +8,29 @@ family. Seeds from 301 on are for tests, those below 100 for development.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
 
 import numpy as np
 
-from ahf_ros.codes.cyclic import smallest_rotation
 from ahf_ros.codes.ring import Family, conforming, ring_family
 from ahf_ros.detectors import DetectorSettings, create_detector
 from ahf_ros.detectors.ring.bands import find_bands
 from ahf_ros.detectors.ring.learning import LearntFamily, learn_families
 from ahf_ros.evaluation import Score, score, total
-from ahf_ros.synthetic.scene import Rendering, SceneSettings, render
 from benchmarks import report
 from benchmarks.report import table
+from support.pictures.drawn_families import LIGHTS, TARGETS, random_family, sheet
 
 FAMILIES = 50
 """Families of each seed."""
-
-LIGHTS = ('normal', 'stripe', 'lattice')
-"""In which they are identified; they are learnt in the first one."""
-
-RULES = ({}, {'parity': 'even'}, {'parity': 'even', 'opposite_pairs': 1}, {'changes': 6})
-"""Rules of words, one of which is drawn."""
-
-TARGETS = 20
-"""In an image that is identified."""
 
 LEARNT_FROM = (20, 54)
 """Targets in an image that a family is learnt from."""
 
 RADII = (5.0, 30.0)
 """Smallest and largest radius of dots, px."""
-
-
-def random_family(file: Path, generator: np.random.Generator) -> dict[str, object]:
-    """Write the data file of a family, and return its rule."""
-    rule = dict(RULES[generator.integers(len(RULES))])
-    bits = int(generator.integers(6, 25))
-    bits += bits % 2 if 'opposite_pairs' in rule else 0
-    inner = generator.uniform(1.4, 2.6)
-    words = generator.integers(1, (1 << bits) - 1, 20_000)
-    words = np.unique(smallest_rotation(words[conforming(words, bits, **rule)], bits))
-    described = {
-        'family': 'mine',
-        'bits': bits,
-        'band': [round(inner, 3), round(inner + generator.uniform(0.45, 1.3), 3)],
-        'words': generator.permutation(words)[:60].tolist(),
-    }
-    file.write_text(json.dumps(described))
-    return rule
 
 
 def rules_right(found: LearntFamily, rule: dict[str, object]) -> tuple[bool, bool]:
@@ -75,28 +45,6 @@ def rules_right(found: LearntFamily, rule: dict[str, object]) -> tuple[bool, boo
         return rules == rule or (found.bits <= 16 and np.array_equal(*either))
 
     return same(found.rules), any(same(rules) for rules, _ in found.likely)
-
-
-def sheet(file: Path, targets: int, light: str, seed: int, values: dict[str, Any]) -> Rendering:
-    """Return the rendering of a sheet that is as large as its targets need."""
-    for growth in range(12):
-        try:
-            return render(
-                SceneSettings(
-                    width=round(1600 * 1.15**growth),
-                    height=round(1200 * 1.15**growth),
-                    targets=min(targets, len(ring_family(str(file)).words)),
-                    light=light,
-                    family='mine',
-                    family_file=str(file),
-                    seed=seed,
-                    **values,
-                )
-            )
-        except ValueError as error:
-            if not str(error).startswith('targets is'):
-                raise
-    raise ValueError(f'targets is {targets!r}, accepted are fewer for dots of this size')
 
 
 def learnt_rightly(image: np.ndarray, code: Family, rule: dict[str, object]) -> tuple[bool, ...]:

@@ -31,8 +31,8 @@ import numpy as np
 
 from ahf_ros.synthetic.scene import SceneSettings, render
 from benchmarks.changed_constant import assigned
-from benchmarks.conditions import Scene, disturbed, strange
 from benchmarks.report import progress, table
+from support.pictures.conditions import Scene, disturbed, strange
 
 ROOT = Path(__file__).resolve().parent.parent
 ROOMS = ('ahf_ros.features.', 'ahf_ros.detectors.ring.')

@@ -9,7 +9,7 @@ import numpy as np
 
 from benchmarks import gsi
 from benchmarks.rows import measured, rendered
-from benchmarks.textures import dot_grid
+from support.pictures.textures import dot_grid
 
 SMALL = replace(gsi.LARGE, width=700, height=500, targets=2, dot_radius=6.0)
 

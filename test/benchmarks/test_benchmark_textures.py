@@ -2,7 +2,8 @@
 
 import json
 
-from benchmarks.textures import lookalikes, main, textured_image
+from benchmarks.textures import main
+from support.pictures.textures import lookalikes, textured_image
 
 
 def test_textures_show_no_rings(capsys, tmp_path):

@@ -8,11 +8,12 @@ import pytest
 from ahf_ros.codes.ring import FAMILY_NAMES, family
 from ahf_ros.codes.square import SQUARE_NAMES
 from ahf_ros.target import Target, TrueTarget
-from benchmarks import disturbances, occluders
-from benchmarks.disturbed import Targets
-from benchmarks.exposure import Cell, Exposure, Occluder
-from benchmarks.lookalikes import LOOKALIKES, other_sectors, other_words
-from benchmarks.sheets import CELL, cell_pixels, mark_sheet, random_numbers, target_sheet
+from benchmarks import disturbances
+from support.pictures import occluders
+from support.pictures.disturbed import Targets
+from support.pictures.exposure import Cell, Exposure, Occluder
+from support.pictures.lookalikes import LOOKALIKES, other_sectors, other_words
+from support.pictures.sheets import CELL, cell_pixels, mark_sheet, random_numbers, target_sheet
 
 RADIUS = 12.0
 

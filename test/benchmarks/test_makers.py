@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from ahf_ros.target import TrueTarget
-from benchmarks.conditions import Scene
 from benchmarks.confidence import readings_of
 from benchmarks.makers import BOUNDS, markdown, records
 from benchmarks.report import about
+from support.pictures.conditions import Scene
 from support.scenes import SMALL, rendered
 
 

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from benchmarks.network_epochs import Field
-from benchmarks.network_optimum import PART, located
+from benchmarks.network_epochs import PART, Field, located
 
 
 @pytest.mark.parametrize('bar', [True, False])

@@ -2,11 +2,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from benchmarks.registration_scans import COMMON, COUNT, clouds, run
+from benchmarks.registration import COMMON, COUNT, clouds, registered
 
 
 def test_a_chain_closes_within_its_covariance() -> None:
-    figures = run(clouds, 1, 1)
+    figures = registered(clouds, 1, 1)
     assert figures.refused == 0
     assert np.shape(figures.chain) == np.shape(figures.adjusted) == (1, COUNT - 1)
     assert figures.closing[0] < 3 * 3 * COMMON

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from benchmarks.reliability import reliability_table
+from benchmarks.confidence import reliability_table
 
 
 def test_each_condition_and_all_of_them_have_their_shares() -> None:

@@ -18,11 +18,11 @@ from ahf_ros.detectors.ring.polar import polar_images
 from ahf_ros.features.frame import ellipse_axes
 from ahf_ros.synthetic.covers import Cover, ink_cover
 from ahf_ros.synthetic.scene import SceneSettings, render
-from benchmarks import occluders
-from benchmarks.disturbed import Targets
-from benchmarks.exposure import Exposure
-from benchmarks.lookalikes import LOOKALIKES
-from benchmarks.sheets import mark_sheet
+from support.pictures import occluders
+from support.pictures.disturbed import Targets
+from support.pictures.exposure import Exposure
+from support.pictures.lookalikes import LOOKALIKES
+from support.pictures.sheets import mark_sheet
 from support.ring import made_up
 
 LEAST = 6.0

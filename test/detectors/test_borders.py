@@ -12,10 +12,10 @@ from ahf_ros.detectors import DetectorSettings, create_detector
 from ahf_ros.detectors.ring.contests import among_others
 from ahf_ros.detectors.ring.detector import find_hypotheses
 from ahf_ros.detectors.ring.hypotheses import Hypotheses
-from benchmarks.disturbed import Targets
-from benchmarks.exposure import Exposure
-from benchmarks.lookalikes import LOOKALIKES
-from benchmarks.sheets import Sheet, mark_sheet
+from support.pictures.disturbed import Targets
+from support.pictures.exposure import Exposure
+from support.pictures.lookalikes import LOOKALIKES
+from support.pictures.sheets import Sheet, mark_sheet
 
 SETTINGS = DetectorSettings(family='metashape12')
 

@@ -14,7 +14,7 @@ from ahf_ros.detectors import create_detector
 from ahf_ros.detectors.cctag.light import EDGES, Lights
 from ahf_ros.synthetic.scene import Rendering
 from ahf_ros.target import Target
-from benchmarks.textures import lookalikes, textured_image
+from support.pictures.textures import lookalikes, textured_image
 from support.scenes import counted, errors, rendering
 
 SIZE = {'width': 560, 'height': 420, 'targets': 4, 'dot_radius': 14.0, 'seed': 2}

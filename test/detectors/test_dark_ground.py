@@ -10,7 +10,7 @@ from ahf_ros.codes.ring import family
 from ahf_ros.detectors import create_detector
 from ahf_ros.evaluation import score
 from ahf_ros.synthetic.bent.picture import render_bent
-from benchmarks.bent import settings
+from support.pictures.bent import settings
 from support.ring import inked
 
 WHITE, BLACK = 0.7, 0.05  # reflectances

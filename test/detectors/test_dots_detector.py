@@ -115,7 +115,7 @@ def test_every_weight_has_its_feature_and_says_what_made_it() -> None:
     made = json.loads(WEIGHTS.read_text(encoding='utf-8'))['dots_confidence']
     assert (len(made['target']), len(made['word'])) == (4, 5)
     seeds = ' '.join(map(str, made['seeds']))
-    assert made['command'] == f'python -m benchmarks.dots_confidence --fit {seeds}'
+    assert made['command'] == f'python -m benchmarks.confidence --family dots --fit {seeds}'
     assert max(made['seeds']) < 101  # those from 101 on are for tests
     assert made['commit']
 

@@ -17,11 +17,11 @@ from ahf_ros.evaluation import RIGHT, WRONG, judge
 from ahf_ros.features import frame
 from ahf_ros.features.pyramid import Octave, image_pyramid, octaves
 from ahf_ros.target import Target
-from benchmarks import occluders
 from benchmarks.disturbances import far_apart
-from benchmarks.exposure import Exposure
-from benchmarks.sheets import target_sheet
 from support.drawn_dots import drawn, in_stripes
+from support.pictures import occluders
+from support.pictures.exposure import Exposure
+from support.pictures.sheets import target_sheet
 from support.ring import made_up
 
 CODE = family('metashape12')

@@ -17,10 +17,10 @@ from ahf_ros.detectors.ring.refinement import refine_centres
 from ahf_ros.evaluation import score
 from ahf_ros.synthetic.scene import SceneSettings
 from ahf_ros.target import UNDECODED, TrueTarget
-from benchmarks import occluders
-from benchmarks.exposure import Exposure
-from benchmarks.lookalikes import other_sectors
-from benchmarks.sheets import Sheet, mark_sheet, random_numbers, target_sheet
+from support.pictures import occluders
+from support.pictures.exposure import Exposure
+from support.pictures.lookalikes import other_sectors
+from support.pictures.sheets import Sheet, mark_sheet, random_numbers, target_sheet
 from support.scenes import SMALL, counts, errors_of, identified, rendered, scored
 
 CODE = family('metashape12')

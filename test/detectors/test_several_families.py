@@ -16,8 +16,8 @@ from ahf_ros.detectors.ring.choice import choose_families, further_families
 from ahf_ros.synthetic.covers import Cover, ink_cover
 from ahf_ros.synthetic.scene import Rendering, SceneSettings
 from ahf_ros.target import UNDECODED, Target
-from benchmarks.exposure import Exposure
-from benchmarks.sheets import mark_sheet
+from support.pictures.exposure import Exposure
+from support.pictures.sheets import mark_sheet
 from support.ring import measured
 from support.scenes import identified, rendered
 

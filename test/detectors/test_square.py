@@ -15,7 +15,7 @@ from ahf_ros.settling import evident
 from ahf_ros.synthetic.scene import Rendering
 from ahf_ros.target import Target
 from benchmarks.squares import readers
-from benchmarks.textures import textured_image
+from support.pictures.textures import textured_image
 from support.scenes import around, counted, rendering
 from support.square_markers import needs_square_markers
 

@@ -27,8 +27,8 @@ from ahf_ros.interchange.camera_info import calibration, undistorted
 from ahf_ros.msg import CodedTarget, CodedTargetArray
 from ahf_ros.orientation.camera import project
 from ahf_ros.target import Target
-from benchmarks.registration_pose import CAMERA, SIZE, View, view
 from support.detector import overrides, own, values
+from support.poses import CAMERA, SIZE, View, view
 
 EVERY = QoSProfile(history=HistoryPolicy.KEEP_ALL, reliability=ReliabilityPolicy.RELIABLE)
 

@@ -14,9 +14,8 @@ from ahf_ros.orientation.network import CameraView, ControlPoint, ScaleBar
 from ahf_ros.orientation.refinement import refine
 from ahf_ros.orientation.similarity import similarity_between
 from benchmarks.network_camcal import dbat, folder, in_dbat_units, solve
-from benchmarks.network_ellipsoids import RELEASED, coverage
-from benchmarks.network_outliers import counted
-from benchmarks.network_scenes import Field, approximate, simulate
+from benchmarks.network_errors import RELEASED, counted, coverage
+from support.network_scenes import Field, approximate, simulate
 
 pytest.importorskip('scipy')
 FIELD = Field(photographs=10, targets=20)

@@ -16,7 +16,7 @@ from ahf_ros.orientation.network import CameraView
 from ahf_ros.orientation.solution import Solution
 from ahf_ros.orientation.stations import mounted_on_rig, mounted_on_robot
 from ahf_ros.orientation.transform import Transform
-from benchmarks.network_scenes import Field, simulate
+from support.network_scenes import Field, simulate
 
 HAND_SIGMA = np.array([1e-4] * 3 + [3e-4] * 3)
 SEEN_SIGMA = np.array([0.05] * 3 + [2e-4] * 3)  # in mm and rad

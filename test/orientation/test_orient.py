@@ -17,8 +17,8 @@ from ahf_ros.orientation.network import CameraView, Network, once_a_photograph
 from ahf_ros.orientation.orient import orient
 from ahf_ros.orientation.progress import Progress
 from ahf_ros.orientation.solution import Solution
-from benchmarks.network_starts import Rendered, deviations, looking, photographed
 from support import ROOT
+from support.random_networks import Rendered, deviations, looking, photographed
 
 pytest.importorskip('scipy', reason='the adjustment needs scipy')
 

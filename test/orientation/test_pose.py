@@ -12,12 +12,12 @@ from ahf_ros import Target, resect
 from ahf_ros.orientation.camera import project, rotation_matrices
 from ahf_ros.orientation.points import MeasuredPoints
 from ahf_ros.orientation.transform import Transform
-from benchmarks.registration_pose import (
+from benchmarks.registration import posed
+from support.poses import (
     CAMERA,
     View,
     error,
     normalised_square,
-    run,
     view,
     with_wrong_id,
 )
@@ -43,7 +43,7 @@ def located(of: View, **changes: Any) -> Any:
 @pytest.mark.lasting
 @pytest.mark.parametrize(('width', 'depth'), [(1.0, 0.0), (1.0, 0.2), (0.1, 0.0)])
 def test_errors_are_as_large_as_covariances_say(width: float, depth: float) -> None:
-    counts = run(width, depth, seed=11, runs=100)
+    counts = posed(width, depth, seed=11, runs=100)
     assert np.mean(counts.squares) == pytest.approx(6, abs=1.05)  # three standard deviations
     assert (counts.refused, counts.flipped, counts.good_rejected) == (0, 0, 0)
     assert counts.named == counts.wrong == 5
@@ -137,7 +137,7 @@ def test_an_id_that_is_there_twice_is_set_aside() -> None:
 
 def test_a_small_plane_has_a_second_pose() -> None:
     """It is marked where it may be the true one, and never taken for it without a mark."""
-    counts = run(0.05, 0.0, seed=5, runs=60)
+    counts = posed(0.05, 0.0, seed=5, runs=60)
     assert counts.ambiguous >= 1
     assert counts.flipped == 0
     marked = [

@@ -9,7 +9,7 @@ from ahf_ros.orientation.planar import is_flat, planar_poses
 from ahf_ros.orientation.relative import relative_orientations
 from ahf_ros.orientation.resection import ALIKE, resections
 from ahf_ros.orientation.triangulation import intersect
-from benchmarks.network_starts import looking
+from support.random_networks import looking
 
 SIGMA = 2e-5
 

@@ -5,7 +5,7 @@ physical centre from the centres of ellipses.
 
 There has to be a target, no pattern of light that resembles one, and its word has to be right.
 Each is a logistic regression on rendered scenes, whose weights are in `fitted_weights.json`.
-`benchmarks.dots_confidence` fits them, and shows how far the result can be trusted.
+`benchmarks.confidence` fits them, and shows how far the result can be trusted.
 """
 
 from __future__ import annotations

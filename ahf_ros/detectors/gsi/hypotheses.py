@@ -1,7 +1,7 @@
 """Hypotheses on targets: how probable each is, and which of those that contradict each other.
 
 The probability is a logistic regression, whose weights are in `fitted_weights.json`.
-`benchmarks.gsi_confidence` fits them, and shows how far the result can be trusted.
+`benchmarks.confidence` fits them, and shows how far the result can be trusted.
 """
 
 from __future__ import annotations

@@ -10,7 +10,7 @@ import numpy as np
 
 from ahf_ros.codes.ring import family
 from ahf_ros.synthetic.covers import ink_cover
-from benchmarks.exposure import GAMMA, INK, WHITE, Cell, Covered, Glare, Occluder
+from support.pictures.exposure import GAMMA, INK, WHITE, Cell, Covered, Glare, Occluder
 
 _LABEL = 3.8  # radius of the paper that another target is printed on, dot radii
 _DIRTY = 3.8  # radius of the area that dirt lies in, dot radii

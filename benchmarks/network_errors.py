@@ -1,9 +1,10 @@
-"""Whether covariances, rejections and suspects are right: lenses, heavy tails, bars and control.
+"""Whether covariances, rejections and suspects of networks are right.
 
-    python -m benchmarks.network --table lenses [--seed 301] [--runs 250]
-    python -m benchmarks.network --table still
-    python -m benchmarks.network --table tails
-    python -m benchmarks.network --table told
+    python -m benchmarks.network --table ellipsoids [--seed 301] [--runs 125]
+
+and so on: `ellipsoids` and `lenses` ask how often error ellipsoids hold the truth, `outliers` and
+`tails` what is rejected and kept, `still` how often a movement is found where there is none, and
+`told` whether the wrong one of several bars or control points is named.
 
 *NEES* is the mean of e' C^+ e over its degrees of freedom, for the errors e of all points after a
 similarity and their whole covariance C: 1 if standard deviations are right.
@@ -23,13 +24,24 @@ from ahf_ros.orientation.knowledge import Known
 from ahf_ros.orientation.measurement import distances
 from ahf_ros.orientation.network import ControlPoint, Network, ScaleBar
 from ahf_ros.orientation.points import MeasuredPoints, entries
+from ahf_ros.orientation.refinement import refine
 from ahf_ros.orientation.similarity import similarity_between
 from ahf_ros.orientation.solution import Solution, Start
 from ahf_ros.orientation.suspects import Misclosures
-from benchmarks.network_ellipsoids import coverage
-from benchmarks.network_scenes import HEIGHT, LENS, WIDTH, Field, approximate, simulate
 from benchmarks.report import number, progress
 from benchmarks.report import table as markdown
+from support.network_scenes import HEIGHT, LENS, WIDTH, Field, approximate, simulate
+
+CHI_SQUARE = 7.814728  # 95 % of three degrees
+RELEASED = ('f', 'cx', 'cy', 'k1', 'k2', 'p1', 'p2')
+SIZES = (8, 15, 30, 60)
+"""Photographs of networks."""
+
+WRONG = 0.05
+"""Share of wrong IDs."""
+
+FAR = 5.0
+"""Standard deviations of a wrong observation that must not be accepted."""
 
 SIZE = Field(36, 108)
 FREEDOM = 5.0
@@ -42,6 +54,135 @@ TOLD = (
 )
 """What is told, how many, and the standard deviation that is said and had, for a field of 2."""
 _RANK = 1e-10  # of eigenvalues of a covariance without a datum, relative to the largest
+
+
+def ellipsoids_table(seeds: Sequence[int], runs: int = 125) -> list[str]:
+    """Return coverage of 95 % ellipsoids as lines of Markdown: runs of each size and field.
+
+    The truth is brought into the datum of the solution, inner constraints on all points, by the
+    similarity of least squares.
+    """
+    lines = [
+        '| field | photographs | runs | parameters given % | all, usual lenses % | sigma0 |',
+        '|---|---|---|---|---|---|',
+    ]
+    for planar in (True, False):
+        for photographs in SIZES:
+            field = Field(photographs, targets=25, planar=planar)
+            held: tuple[list[float], list[float]] = ([], [])
+            sigma0 = []
+            for run in range(runs):
+                random = np.random.default_rng([seeds[0], photographs, planar, run])
+                network, truth = simulate(field, random)
+                start = approximate(truth, random)
+                given = adjust(network, start, release=RELEASED, test=False)
+                held[0].append(coverage(given, truth))
+                sigma0.append(given.sigma0)
+                if run < runs // 5:
+                    held[1].append(coverage(adjust(network, start), truth))
+            name = 'planar' if planar else '3-D'
+            lines.append(
+                f'| {name} | {photographs} | {runs} | {100 * np.mean(held[0]):.1f} '
+                f'| {100 * np.mean(held[1]):.1f} ({len(held[1])} runs) | {np.mean(sigma0):.3f} |'
+            )
+    return lines
+
+
+def coverage(solution: Solution, truth: Start) -> float:
+    """Return the share of points whose 95 % ellipsoid holds the truth."""
+    points = solution.start.points
+    found = np.isfinite(points[:, 0])
+    movement = similarity_between(truth.points[found], points[found])
+    error = points[found] - movement.moved(truth.points[found])
+    own = solution.point_covariances[found]
+    squares = np.einsum('ni,ni->n', error, np.linalg.solve(own, error[:, :, None])[:, :, 0])
+    return float((squares < CHI_SQUARE).mean())
+
+
+def outliers_table(seeds: Sequence[int], runs: int = 25) -> list[str]:
+    """Return what is accepted and kept, as lines of Markdown."""
+    lines = [
+        '| field | photographs | runs | wrong | accepted above 5 sigma | good | kept % '
+        '| moved target named |',
+        '|---|---|---|---|---|---|---|---|',
+    ]
+    for planar in (True, False):
+        for photographs in SIZES:
+            sums = np.zeros(5, dtype=int)
+            for run in range(runs):
+                random = np.random.default_rng([seeds[0], photographs, planar, run])
+                sums += counted(Field(photographs, 40, planar, each=30), random)
+            wrong, accepted, good, kept, named = sums
+            lines.append(
+                f'| {"planar" if planar else "3-D"} | {photographs} | {runs} | {wrong} '
+                f'| {accepted} | {good} | {100 * kept / good:.2f} | {named} |'
+            )
+    return lines
+
+
+def counted(field: Field, random: np.random.Generator) -> tuple[int, int, int, int, bool]:
+    """Return how many are wrong, wrong and accepted, good, good and kept, and if 0 is named."""
+    network, truth = simulate(field, random)
+    network, second, late = with_moved_target(network, truth, random)
+    network, wrong = with_wrong_ids(network, random)
+    start = refine(network, approximate(truth, random), ('f', 'k1'))
+    solution = adjust(network, start)
+    observations, used = network.observations, solution.start.used
+    right = (observations.point == 0) & ~wrong
+    balance = 2 * (late & right).sum() - right.sum()
+    if balance > 0 or (balance == 0 and (used & late & right).any()):
+        truth.points[0] = second  # where it is more often is where it is
+    computed = project(
+        truth.calibrations[0],
+        truth.rotations[observations.photograph],
+        truth.positions[observations.photograph],
+        truth.points[observations.point],
+    )
+    sigma = np.sqrt(observations.covariance[:, 0, 0])
+    large = np.linalg.norm(observations.xy - computed, axis=1) > FAR * sigma
+    bad = large | wrong
+    named = any(text.startswith('target 0 is at two places') for text in solution.warnings)
+    return bad.sum(), (used & large).sum(), (~bad).sum(), (used & ~bad).sum(), named
+
+
+def with_moved_target(
+    network: Network, truth: Start, random: np.random.Generator
+) -> tuple[Network, np.ndarray, np.ndarray]:
+    """Return a network whose target 0 moves halfway, its second place, and the rows there."""
+    observations = network.observations
+    rows = np.flatnonzero(observations.point == 0)
+    late = rows[len(rows) // 2 :]
+    step = random.normal(size=3) * [1, 1, 0.2]
+    second = truth.points[0] + 0.1 * step / np.linalg.norm(step)
+    photographs = observations.photograph[late]
+    before, after = (
+        project(
+            truth.calibrations[0],
+            truth.rotations[photographs],
+            truth.positions[photographs],
+            np.tile(place, (len(late), 1)),
+        )
+        for place in (truth.points[0], second)
+    )
+    xy = observations.xy.copy()
+    xy[late] += after - before
+    moved_network = replace(network, observations=replace(observations, xy=xy))
+    return moved_network, second, np.isin(np.arange(len(xy)), late)
+
+
+def with_wrong_ids(network: Network, random: np.random.Generator) -> tuple[Network, np.ndarray]:
+    """Return a network with 5 % wrong IDs, of targets not in their photograph, and which."""
+    observations = network.observations
+    point = observations.point.copy()
+    wrong = random.random(len(point)) < WRONG
+    for row in np.flatnonzero(wrong):
+        present = point[observations.photograph == observations.photograph[row]]
+        absent = np.setdiff1d(np.arange(1, len(network.targets)), present)
+        if len(absent):
+            point[row] = random.choice(absent)
+        else:
+            wrong[row] = False
+    return replace(network, observations=replace(observations, point=point)), wrong
 
 
 def nees(solution: Solution, truth: Start) -> float:

@@ -1,31 +1,19 @@
-"""Whether poses of single images are as exact as their covariances say, and how long they take."""
+"""Single images of targets whose poses are known."""
 
 from __future__ import annotations
 
-import time
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ahf_ros.orientation.camera import project, rotation_matrices
 from ahf_ros.orientation.network import FloatArray
 from ahf_ros.orientation.points import MeasuredPoints
-from ahf_ros.orientation.pose import Pose
-from ahf_ros.orientation.single_image import resect
 from ahf_ros.orientation.transform import Transform
 from ahf_ros.target import Target
 
 SIZE = 2464, 2056
 CAMERA = np.array([2400.0, 1240.0, 1020.0, -0.1, 0.08, -0.02, 3e-4, -2e-4, 0.0, 0.0])
-FIELDS = {
-    'plane': (1.0, 0.0),
-    'nearly a plane': (1.0, 0.03),
-    'relief': (1.0, 0.15),
-    'space': (1.0, 0.5),
-    'small plane': (0.1, 0.0),
-    'nearly a small plane': (0.1, 0.002),
-}
-"""Width and half the depth of fields of targets, m. Small ones hardly show perspective."""
 
 
 @dataclass(frozen=True)
@@ -36,21 +24,6 @@ class View:
     points: MeasuredPoints
     true: Transform
     wrong: str = ''  # name of the target with another's ID
-
-
-@dataclass
-class Counts:
-    """What becomes of the images of a row."""
-
-    squares: list[float] = field(default_factory=list)
-    seconds: list[float] = field(default_factory=list)
-    refused: int = 0
-    ambiguous: int = 0
-    flipped: int = 0  # wrong ones that are not marked
-    named: int = 0
-    wrong: int = 0
-    good_rejected: int = 0
-    moved: float = 0.0  # by wrong IDs, in standard deviations
 
 
 def view(
@@ -120,65 +93,3 @@ def normalised_square(found: Transform, true: Transform) -> float:
     """Return the squared error in the metric of the covariance, 6 in the mean."""
     gap = error(found, true)
     return float(gap @ np.linalg.solve(found.covariance, gap))
-
-
-def run(width: float, depth: float, seed: int, runs: int) -> Counts:
-    """Return the counts of images of a field; five in a hundred have a wrong ID."""
-    counts = Counts()
-    for number in range(runs):
-        random = np.random.default_rng([seed, round(1e4 * width), round(1e4 * depth), number])
-        of = view(width, depth, random)
-        if number % 20 == 0:
-            of = with_wrong_id(of, random)
-        begin = time.process_time()
-        try:
-            pose = resect(of.targets, of.points, CAMERA)
-        except ValueError:
-            counts.refused += 1
-            continue
-        finally:
-            counts.seconds.append(time.process_time() - begin)
-        _count(counts, of, pose)
-    return counts
-
-
-def _count(counts: Counts, of: View, pose: Pose) -> None:
-    left_out = {it.target for it in pose.rejected}
-    counts.good_rejected += len(left_out - {of.wrong})
-    if of.wrong:
-        counts.wrong += 1
-        counts.named += of.wrong in left_out
-        others = [it for it in of.targets if str(it.id) != of.wrong]
-        without = resect(others, of.points, CAMERA)
-        counts.moved = max(counts.moved, normalised_square(pose.camera, without.camera) ** 0.5)
-    if pose.second:
-        counts.ambiguous += 1
-        return
-    square = normalised_square(pose.camera, of.true)
-    counts.flipped += square > 100
-    counts.squares.append(square)
-
-
-def table(seed: int, runs: int) -> list[str]:
-    """Return the figures of each field as lines of Markdown."""
-    lines = [
-        '| field | images | NEES of 6 | refused | marked as ambiguous | beyond 10 sigma '
-        '| wrong IDs named | largest shift by them, sigma | good left out '
-        '| processor time, ms: mean, most |',
-        '|---' * 10 + '|',
-    ]
-    resect(*_warm(seed))
-    for name, (width, depth) in FIELDS.items():
-        of = run(width, depth, seed, runs)
-        of.seconds.sort()
-        lines.append(
-            f'| {name} | {runs} | {np.mean(of.squares):.2f} | {of.refused} | {of.ambiguous} '
-            f'| {of.flipped} | {of.named} of {of.wrong} | {of.moved:.1e} | {of.good_rejected} '
-            f'| {1e3 * np.mean(of.seconds):.1f}, {1e3 * of.seconds[-1]:.1f} |'
-        )
-    return lines
-
-
-def _warm(seed: int) -> tuple[tuple[Target, ...], MeasuredPoints, FloatArray]:
-    of = view(1.0, 0.0, np.random.default_rng(seed))
-    return of.targets, of.points, CAMERA

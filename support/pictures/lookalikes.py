@@ -12,7 +12,7 @@ import numpy as np
 
 from ahf_ros.codes.ring import BITS, Family, sectors
 from ahf_ros.synthetic.covers import Cover, ink_cover, stamp_cover
-from benchmarks.sheets import CELL, Ink
+from support.pictures.sheets import CELL, Ink
 
 _FINE = 61  # sectors of arcs of any length; a prime, so that they meet no sectors of a family
 _SHIFTS = np.linspace(-0.2, 0.2, 41)  # of edges, dot radii

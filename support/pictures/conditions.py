@@ -1,7 +1,7 @@
 """Scenes under every condition that the confidence of ring targets has to bear.
 
-The disturbances are other ones than those of `benchmarks.disturbed`: other gray values, widths and
-distances. Only the kinds are the same.
+The disturbances are other ones than those of `support.pictures.disturbed`: other gray values,
+widths and distances. Only the kinds are the same.
 """
 
 from __future__ import annotations
@@ -23,13 +23,13 @@ from ahf_ros.synthetic.bent.picture import render_bent
 from ahf_ros.synthetic.patterns import LIGHT_NAMES, benchmark_lights
 from ahf_ros.synthetic.scene import SceneSettings, render
 from ahf_ros.target import Target, TrueTarget
-from benchmarks import bent, occluders
-from benchmarks.disturbed import blurred, compressed, noisy, overlapping
-from benchmarks.exposure import Exposure
-from benchmarks.lookalikes import LOOKALIKES
-from benchmarks.processing import phone
-from benchmarks.random_families import LIGHTS, TARGETS, random_family, sheet
-from benchmarks.sheets import COLUMNS, ROWS, mark_sheet, random_numbers, target_sheet
+from support.pictures import bent, occluders
+from support.pictures.disturbed import blurred, compressed, noisy, overlapping
+from support.pictures.drawn_families import LIGHTS, TARGETS, random_family, sheet
+from support.pictures.exposure import Exposure
+from support.pictures.lookalikes import LOOKALIKES
+from support.pictures.phone import phone
+from support.pictures.sheets import COLUMNS, ROWS, mark_sheet, random_numbers, target_sheet
 
 SHADOWS = (0.3, 0.08, 0.04, 0.02)
 """Ambient light of the smaller scenes, as a share of the projector's."""

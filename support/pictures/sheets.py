@@ -18,7 +18,7 @@ from ahf_ros.codes.ring import FAMILY_NAMES, family
 from ahf_ros.codes.square import CellPrint, dictionary
 from ahf_ros.synthetic.covers import Cover, ink_cover
 from ahf_ros.target import TrueTarget
-from benchmarks.exposure import GAMMA, INK, WHITE, Cell, Exposure
+from support.pictures.exposure import GAMMA, INK, WHITE, Cell, Exposure
 
 Ink = Callable[[float], Cover]
 """The ink of a mark that is turned by an angle, rad."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from benchmarks.disturbed import blurred, compressed, noisy
+from support.pictures.disturbed import blurred, compressed, noisy
 
 BLUR = (0.4, 1.0)
 """Standard deviation of the lens, px."""

@@ -12,9 +12,9 @@ import numpy as np
 
 from ahf_ros.codes.ring import FAMILY_NAMES, family
 from ahf_ros.target import TrueTarget
-from benchmarks import occluders
-from benchmarks.exposure import Exposure
-from benchmarks.sheets import COLUMNS, Sheet, random_numbers, target_sheet
+from support.pictures import occluders
+from support.pictures.exposure import Exposure
+from support.pictures.sheets import COLUMNS, Sheet, random_numbers, target_sheet
 
 RADIUS = 12.0
 """Of the dots, px."""

@@ -1,0 +1,1 @@
+"""Pictures that are drawn for tests and benchmarks, with their truth; most are of ring targets."""
