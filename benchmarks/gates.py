@@ -3,7 +3,7 @@
     python -m benchmarks.gates [--detectors ring] [--gates TEXT ...] [--pictures TEXT ...]
 
 A gate is any comparison that drops a candidate, an outline, a dot, a reading or a word;
-`benchmarks.gate_list` lists them in order. One at a time is opened, and the pictures are
+`gates.yaml` lists them in order. One at a time is opened, and the pictures are
 identified again. For each gate: how many targets are read right only when it is open, how many
 only when it is closed, how many more reports are wrong or false when it is open, and what it saves
 in calls. A gate that loses more than 2 in 1,000 targets is to be loosened or goes, and so does one
@@ -31,14 +31,13 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+from ruamel.yaml import YAML
 
 from ahf_ros.codes.families import KINDS
 from ahf_ros.interchange.truth_files import read_truth
 from ahf_ros.synthetic.scene import SceneSettings, render
 from benchmarks import report
-from benchmarks.changed_constant import assigned, definitions
-from benchmarks.gate_list import GATES, Gate
-from benchmarks.opened_gate import Shown
+from benchmarks.changed import Shown, assigned, definitions
 from support import PHOTOS, ROOT, environment
 
 YARDSTICK = ROOT.parent / 'shared' / 'yardstick'
@@ -72,6 +71,32 @@ SHOWN_LENGTH = 30
 
 
 @dataclass(frozen=True, slots=True)
+class Gate:
+    """What a gate drops, where it is in `ahf_ros`, and the expression with which it is open."""
+
+    about: str
+    place: str
+    opened: str
+
+
+def _listed() -> dict[str, list[Gate]]:
+    """Return the gates by detector; detectors share groups of them."""
+    listed = YAML(typ='safe').load(Path(__file__).with_suffix('.yaml'))
+    return {
+        detector: [
+            Gate(*gate)
+            for item in listed[detector]
+            for gate in (item if isinstance(item[0], list) else [item])
+        ]
+        for detector in RENDERED
+    }
+
+
+GATES = _listed()
+"""The gates by detector."""
+
+
+@dataclass(frozen=True, slots=True)
 class Picture:
     """An image, what it shows, and the family that it is read as."""
 
@@ -85,7 +110,7 @@ class Picture:
 class Seen:
     """What was identified in one picture."""
 
-    right: frozenset[int]  # indices into its truth
+    right: dict[int, float]  # errors of targets, px, by their indices into its truth
     wrong: int
     false: int
     calls: int
@@ -216,10 +241,14 @@ def seen(folder: Path, gate: Gate | None = None) -> dict[str, Seen]:
     Pictures that are not done in time, or whose detector does not work then, are missing.
     """
     changed = (PACKAGE + gate.place, gate.opened) if gate else ()
-    command = [sys.executable, '-m', 'benchmarks.opened_gate', str(folder), *changed]
-    told = {'cwd': ROOT, 'env': environment(OPENBLAS_NUM_THREADS='1')}
+    command = [sys.executable, '-m', 'benchmarks.changed', str(folder), *changed]
     process = subprocess.Popen(
-        command, text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE, **told
+        command,
+        cwd=ROOT,
+        env=environment(OPENBLAS_NUM_THREADS='1'),
+        text=True,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
     )
     try:
         output, errors = process.communicate(timeout=PATIENCE)
@@ -232,7 +261,8 @@ def seen(folder: Path, gate: Gate | None = None) -> dict[str, Seen]:
     for line in output.splitlines():
         values = json.loads(line)
         name = values.pop('picture')
-        found[name] = Seen(**{**values, 'right': frozenset(values['right'])})
+        values['right'] = {int(index): error for index, error in values['right'].items()}
+        found[name] = Seen(**values)
     return found
 
 
@@ -243,10 +273,10 @@ def difference(
     made = Difference()
     for name in closed.keys() & opened.keys():
         before, after = closed[name], opened[name]
-        gained = len(after.right - before.right)
+        gained = len(after.right.keys() - before.right.keys())
         made.targets += len(named[name].truth)
         made.gained += gained
-        made.lost += len(before.right - after.right)
+        made.lost += len(before.right.keys() - after.right.keys())
         made.bad += after.wrong + after.false - before.wrong - before.false
         made.calls += before.calls
         made.more += after.calls

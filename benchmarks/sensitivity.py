@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import argparse
 import ast
-import json
 import math
 import os
 import re
@@ -30,7 +29,9 @@ from pathlib import Path
 import numpy as np
 
 from ahf_ros.synthetic.scene import SceneSettings, render
-from benchmarks.changed_constant import assigned
+from benchmarks.changed import assigned
+from benchmarks.gates import PACKAGE, Gate, Picture, seen
+from benchmarks.gates import written as written_pictures
 from benchmarks.report import progress, table
 from support.pictures.conditions import Scene, disturbed, strange
 
@@ -41,9 +42,6 @@ BOUNDED = {'CERTAIN', '_STRAIGHT', 'WHOLE', '_MINIMUM_AGREEMENT'}
 
 LIGHTS = ('stripe', 'fine_stripe', 'lattice', 'dense_lattice')
 FACTORS = (0.5, 2.0)
-PATIENCE = 600.0
-"""Longest time for the scenes with one constant changed, s."""
-
 SMALL = [
     SceneSettings(
         width=1600,
@@ -139,31 +137,26 @@ def screened() -> Iterator[Scene]:
 def written(scenes: Iterable[Scene], folder: Path) -> Path:
     """Write scenes with their truth into a folder."""
     folder.mkdir()
-    for number, scene in enumerate(scenes):
-        truth = np.array([(target.id, target.x, target.y) for target in scene.truth])
-        truth = truth.reshape(-1, 3)
-        path = folder / f'{number:03}.npz'
-        np.savez(path, image=scene.image, truth=truth, family=scene.family)
+    written_pictures(
+        [
+            Picture('', it.image, tuple((str(of.id), of.x, of.y) for of in it.truth), it.family)
+            for it in scenes
+        ],
+        folder,
+    )
     return folder
 
 
 def outcome(folder: Path, constant: str = '', value: float = 0.0) -> Outcome:
     """Return what `ring` identifies with a constant changed, in a process of its own."""
-    change = (constant, repr(value)) if constant else ()
-    try:
-        done = subprocess.run(
-            [sys.executable, '-m', 'benchmarks.changed_constant', str(folder), *change],
-            cwd=ROOT,
-            capture_output=True,
-            text=True,
-            timeout=PATIENCE,
-        )
-    except subprocess.TimeoutExpired:
+    module, _, name = constant.removeprefix(PACKAGE).rpartition('.')
+    found = seen(folder, Gate(constant, f'{module}:{name}', repr(value)) if constant else None)
+    if len(found) < len(list(folder.iterdir())):
         return Outcome()
-    if done.returncode != 0:
-        print(done.stderr, end='', file=sys.stderr)  # why it does not work
-        return Outcome()
-    return Outcome(**json.loads(done.stdout))
+    errors = [error for of in found.values() for error in of.right.values()]
+    wrong, false = (sum(getattr(of, kind) for of in found.values()) for kind in ('wrong', 'false'))
+    rmse = float(np.sqrt(np.mean(np.square(errors)))) if errors else None
+    return Outcome(len(errors), wrong, false, rmse)
 
 
 def changed(name: str, value: float, factor: float) -> float:

@@ -11,10 +11,19 @@ import pytest
 from ahf_ros.synthetic.scene import SceneSettings, render
 from ahf_ros.target import Target
 from benchmarks import gates
-from benchmarks.changed_constant import replace
-from benchmarks.gate_list import GATES, Gate
-from benchmarks.gates import Difference, Picture, Seen, difference, row, seen, value_of, written
-from benchmarks.opened_gate import verdicts
+from benchmarks.changed import replace, verdicts
+from benchmarks.gates import (
+    GATES,
+    Difference,
+    Gate,
+    Picture,
+    Seen,
+    difference,
+    row,
+    seen,
+    value_of,
+    written,
+)
 
 CLOSED = Gate('every word', 'detectors.ring.hypotheses:CERTAIN', '1.1')
 NO_MATTER = Gate('blobs of few pixels', 'features.small_dots:_MINIMUM_PIXELS', '1')
@@ -112,8 +121,8 @@ def test_reports_are_judged_as_the_yardstick_does() -> None:
         Target(id=-1, code=0, x=95.0, y=90.0, **place),
     ]
     truth = (('1', 0.0, 0.0), ('7', 50.0, 52.0), ('code 6', 200.0, 0.0))
-    assert verdicts(found, truth) == ({0}, 2, 1)
-    assert verdicts(found, (('code 9', None, None), ('2', None, None))) == ({0, 1}, 0, 2)
+    assert verdicts(found, truth) == ({0: 3.0}, 2, 1)
+    assert verdicts(found, (('code 9', None, None), ('2', None, None))) == ({0: 0.0, 1: 0.0}, 0, 2)
 
 
 def test_pictures_are_chosen_by_a_part_of_their_names() -> None:
@@ -133,7 +142,7 @@ def test_two_in_a_thousand_may_die() -> None:
 
 
 def test_only_pictures_that_were_done_in_time_count() -> None:
-    both = {name: Seen(frozenset([0]), 0, 0, 10, 1.0) for name in ('a', 'b')}
+    both = {name: Seen({0: 0.0}, 0, 0, 10, 1.0) for name in ('a', 'b')}
     of = Picture('', np.zeros((1, 1)), (('1', 0.0, 0.0),), 'metashape12')
     made = difference(both, {'a': both['a']}, {'a': of, 'b': of})
     assert (made.targets, made.calls, made.more) == (1, 10, 10)

@@ -1,9 +1,11 @@
-"""`ring` with one constant changed, on the scenes in a folder; see `benchmarks.sensitivity`.
+"""What is identified in the pictures in a folder with one constant or function changed.
 
-    python -m benchmarks.changed_constant FOLDER [MODULE.NAME VALUE]
+    python -m benchmarks.changed FOLDER [MODULE:NAME EXPRESSION]
 
-The constant is changed in the source of its module as that is imported. So values that are
-computed from it, default arguments and names imported into other modules change as well.
+It is for `benchmarks.gates` and `benchmarks.sensitivity`. The name is changed in the source of its
+module as that is imported. So values that are computed from it, default arguments and names
+imported into other modules change as well. A line of JSON comes for each picture as soon as it is
+identified, so that those that were done count where a change takes too long.
 """
 
 from __future__ import annotations
@@ -12,7 +14,8 @@ import argparse
 import ast
 import json
 import sys
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Sequence
 from functools import partial
 from importlib.machinery import SourceFileLoader
 from pathlib import Path
@@ -21,6 +24,12 @@ from typing import Any, TypeAlias
 
 Scope: TypeAlias = ast.Module | ast.ClassDef | ast.FunctionDef
 
+NEAR = 5.0
+"""Largest distance of a target from its true place, px."""
+
+Shown = tuple[str, float | None, float | None]
+"""A target of a picture: its ID, or 'code' and its code, and its place, if that is known."""
+
 
 def change(place: str, expression: str) -> None:
     """Change a name of a module that is not imported yet; ValueError if it has none.
@@ -28,12 +37,11 @@ def change(place: str, expression: str) -> None:
     Parameters
     ----------
     place : str
-        Name of the module, a dot, and that of the constant or function. After a colon instead of
-        the dot, the name may lie in functions or classes: `module:function.local`.
+        `module:NAME`; the name may lie in functions or classes, `module:function.local`.
     expression : str
         What the name is assigned instead, Python, in which `ORIGINAL` is what it is assigned now.
     """
-    module, _, name = place.rpartition(':' if ':' in place else '.')
+    module, _, name = place.partition(':')
     compiled = SourceFileLoader.get_code
 
     def get_code(loader: SourceFileLoader, fullname: str) -> CodeType | None:
@@ -43,7 +51,7 @@ def change(place: str, expression: str) -> None:
         try:
             replace(tree, name, expression)
         except KeyError:
-            raise ValueError(f'{module} has no constant {name}') from None
+            raise ValueError(f'{module} has no {name}') from None
         return compile(ast.fix_missing_locations(tree), loader.path, 'exec')
 
     SourceFileLoader.get_code = get_code  # type: ignore[method-assign]
@@ -120,44 +128,75 @@ class _Original(ast.NodeTransformer):
         return self.value if node.id == 'ORIGINAL' else node
 
 
-def results(folder: Path) -> dict[str, Any]:
-    """Return what `ring` identifies in all scenes of a folder together."""
-    # Imported only now, so that the constant is changed already.
-    import numpy as np
+def verdicts(targets: Sequence[Any], truth: Sequence[Shown]) -> tuple[dict[int, float], int, int]:
+    """Return the errors of the targets of the truth that are right, px, by their indices.
 
-    from ahf_ros.detectors.contract import DetectorSettings
-    from ahf_ros.detectors.ring.detector import RingDetector
-    from ahf_ros.evaluation import score, total
-    from ahf_ros.target import TrueTarget
-
-    scores = []
-    for path in sorted(folder.glob('*.npz')):
-        with np.load(path) as scene:
-            detector = RingDetector(DetectorSettings(family=str(scene['family'])))
-            truth = [TrueTarget(int(number), x, y) for number, x, y in scene['truth'].tolist()]
-            scores.append(score(truth, detector(scene['image'])))
-    figures = total(scores)
-    return {
-        'right': figures.right,
-        'wrong': figures.wrong,
-        'false': figures.false_positives,
-        'rmse': figures.rmse[2] if figures.rmse else None,
-    }
+    Then follow the numbers of wrong and of false reports. A report is right if it has the ID of
+    the nearest place, wrong with another one or again, and false farther away. Where places are
+    not known it is right or false.
+    """
+    right: dict[int, float] = {}
+    wrong = false = 0
+    for target in targets:
+        if target.id < 0:
+            continue
+        names = {str(target.id), f'code {target.code}'}
+        placed = [
+            (((x - target.x) ** 2 + (y - target.y) ** 2) ** 0.5, index)
+            for index, (_, x, y) in enumerate(truth)
+            if x is not None and y is not None
+        ]
+        if placed:
+            away, nearest = min(placed)
+            if away > NEAR:
+                false += 1
+            elif truth[nearest][0] in names and nearest not in right:
+                right[nearest] = away
+            else:
+                wrong += 1
+        else:
+            named = [index for index, (name, _, _) in enumerate(truth) if name in names]
+            free = [index for index in named if index not in right]
+            right |= dict.fromkeys(free[:1], 0.0)
+            false += not free
+    return right, wrong, false
 
 
 def main() -> None:
-    """Print the results as JSON."""
+    """Print a line for each picture."""
     parser = argparse.ArgumentParser(description=__doc__.split('\n\n')[0])
     parser.add_argument('folder', type=Path)
-    parser.add_argument('change', nargs='*', metavar='MODULE.NAME VALUE')
+    parser.add_argument('change', nargs='*', metavar='MODULE:NAME EXPRESSION')
     options = parser.parse_args()
     if options.change:
-        constant, value = options.change
-        change(constant, value)
-    found = results(options.folder)
-    if options.change and constant.rpartition('.')[0] not in sys.modules:
-        raise SystemExit(f'{constant} is not in a module that the detector imports')
-    print(json.dumps(found))
+        change(*options.change)
+    # Imported only now, so that the gate is open already.
+    import cv2
+    import numpy as np
+
+    from ahf_ros import create_identifier
+    from support.calls import calls_of
+
+    cv2.setNumThreads(1)
+    warm: set[str] = set()
+    for path in sorted(options.folder.glob('*.npz')):
+        with np.load(path) as picture:
+            image, family = picture['image'], str(picture['family'])
+            truth = json.loads(str(picture['truth']))
+        identifier = create_identifier(family=family, threads=1)
+        if family not in warm:  # tables that are made once do not count
+            warm.add(family)
+            identifier.identify(image[:400, :400])
+        found: list[Any] = []
+        started = time.process_time()
+        calls = calls_of(lambda: found.append(identifier.identify(image)))  # noqa: B023
+        seconds = time.process_time() - started
+        right, wrong, false = verdicts(found[0].targets, truth)
+        seen: dict[str, Any] = {'picture': path.stem, 'right': right, 'wrong': wrong}
+        seen |= {'false': false, 'calls': calls, 'seconds': seconds}
+        if options.change and options.change[0].partition(':')[0] not in sys.modules:
+            raise SystemExit(f'{options.change[0]} is not in a module that is imported')
+        print(json.dumps(seen), flush=True)
 
 
 if __name__ == '__main__':
