@@ -18,6 +18,7 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Sequence
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -83,39 +84,20 @@ def records(
 
 def markdown(figures: report.Report) -> str:
     """Return the report as a table."""
-    rows = []
-    for of in figures['rows']:
-        far = of['far'] / of['measured'] if of['measured'] else None
-        rows.append(
-            (
-                of['group'],
-                of['name'],
-                of['expected'],
-                of['right'],
-                of['wrong'],
-                of['false_positives'],
-                number(of['rmse_xy'], 3),
-                number(of['largest_error'], 2),
-                number(of['nees'], 1),
-                number(far and 100 * far, 1),
-                f'{of["calls"]:,}',
-            )
-        )
-    right, expected, wrong, false = (
-        sum(of[key] for of in figures['rows'])
-        for key in ('right', 'expected', 'wrong', 'false_positives')
-    )
-    head = ('targets', 'light', 'N', 'right', 'wrong', 'false')
-    head += ('RMSE XY px', 'largest px', 'NEES', f'beyond {FAR:g} sigma %', 'calls')
-    return '\n'.join(
-        [
-            f'{figures["method"]}, family {figures["family"]}. ' + report.about_text(figures),
-            '',
-            *report.table(head, rows),
-            '',
-            f'{right} of {expected} right, {wrong} wrong, {false} false.',
-        ]
-    )
+
+    def beyond(of: report.Report) -> str:
+        return number(100 * of['far'] / of['measured'] if of['measured'] else None, 1)
+
+    columns: dict[str, report.Column] = {
+        **{'targets': 'group', 'light': 'name', 'N': 'expected'},
+        **{'right': 'right', 'wrong': 'wrong', 'false': 'false_positives'},
+        **{'RMSE XY px': ('rmse_xy', 3), 'largest px': ('largest_error', 2), 'NEES': ('nees', 1)},
+        f'beyond {FAR:g} sigma %': beyond,
+        'calls': lambda of: f'{of["calls"]:,}',
+    }
+    about = f'{figures["method"]}, family {figures["family"]}. {report.about_text(figures)}'
+    table = report.record_table(figures['rows'], columns)
+    return '\n'.join([about, '', *table, '', report.summary(figures['rows'])])
 
 
 def parser() -> argparse.ArgumentParser:
@@ -130,19 +112,20 @@ def parser() -> argparse.ArgumentParser:
     return made
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Measure and print."""
-    options = report.parsed(parser(), arguments)
-    figures = report.about(options.seeds, method=options.detector, family=options.family)
+def measure(options: argparse.Namespace) -> report.Report:
+    """Return the figures of all rows that are asked for."""
+    kinds = product(options.polarities, options.sizes, options.lights)
     cases = [
         case(options.family, polarity, light, radius, options.targets)
-        for polarity in options.polarities
-        for radius in options.sizes
-        for light in options.lights
+        for polarity, radius, light in kinds
     ]
-    figures['rows'] = records(cases, options.seeds, options.detector)
-    report.publish(figures, markdown(figures), options)
-    return 0
+    rows = records(cases, options.seeds, options.detector)
+    return {'method': options.detector, 'family': options.family, 'rows': rows}
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Measure and print."""
+    return report.run(parser(), measure, markdown, arguments)
 
 
 if __name__ == '__main__':

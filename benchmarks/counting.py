@@ -8,6 +8,7 @@ on are for tests, those below for development.
 
 from __future__ import annotations
 
+import sys
 import time
 from collections.abc import Sequence
 from dataclasses import replace
@@ -63,13 +64,15 @@ def measured(image: np.ndarray) -> tuple[int, float]:
     return estimate, (time.perf_counter() - identified) / (identified - started)
 
 
-def main(arguments: Sequence[str] | None = None) -> None:
+def main(arguments: Sequence[str] | None = None) -> int:
     """Print the table as Markdown."""
-    options = report.parsed(report.parser(__doc__), arguments)
-    figures = report.about(options.seeds, table=counted(options.seeds))
-    page = '\n'.join([report.about_text(figures), '', *figures['table']])
-    report.publish(figures, page, options)
+    return report.run(
+        report.parser(__doc__),
+        lambda options: {'table': counted(options.seeds)},
+        lambda figures: '\n'.join([report.about_text(figures), '', *figures['table']]),
+        arguments,
+    )
 
 
 if __name__ == '__main__':
-    main()
+    sys.exit(main())

@@ -21,9 +21,8 @@ from pathlib import Path
 import numpy as np
 
 from ahf_ros.codes import RING_NAMES
-from ahf_ros.codes.cyclic import smallest_rotation
 from ahf_ros.codes.families import AUTO, KINDS
-from ahf_ros.codes.ring import FAMILY_NAMES, Family, family
+from ahf_ros.codes.ring import FAMILY_NAMES, family
 from ahf_ros.detectors import DetectorSettings, create_detector
 from ahf_ros.detectors.contract import Detector, Expecting
 from ahf_ros.evaluation import FALSE, RIGHT, WRONG, judge
@@ -33,7 +32,7 @@ from ahf_ros.target import Target, TrueTarget
 from benchmarks import report
 from benchmarks.report import FIRST_TEST_SEED, progress, table
 from support import PHOTOS
-from support.pictures.disturbed import Scene, Targets
+from support.pictures.disturbed import Scene, Targets, far_apart
 from support.pictures.exposure import Exposure
 from support.pictures.lookalikes import LOOKALIKES, other_words
 from support.pictures.sheets import COLUMNS, ROWS, mark_sheet
@@ -128,33 +127,6 @@ def disturbed(options: argparse.Namespace) -> Iterator[Job]:
         for row, scenes in targets.rows():
             if not options.rows or any(part in row for part in options.rows):
                 yield row, name, detect, scenes
-
-
-def far_apart(code: Family, sectors: int, seed: int) -> tuple[int, ...]:
-    """Return IDs that cannot look alike, up to a number of sectors of each covered.
-
-    Parameters
-    ----------
-    code : Family
-    sectors : int
-        Largest number of neighbouring sectors that are covered.
-    seed : int
-        Of the order in which IDs are tried.
-    """
-    windows = [
-        sum(1 << (start + step) % code.bits for step in range(count))
-        for count in range(sectors + 1)
-        for start in range(code.bits)
-    ]
-    seen: set[int] = set()
-    chosen = []
-    for index in np.random.default_rng([seed, 8]).permutation(len(code.words)).tolist():
-        left = code.words[index] & ~np.array(windows)
-        looks = set(smallest_rotation(left, code.bits).tolist())
-        if not looks & seen:
-            chosen.append(index + 1)
-            seen |= looks
-    return tuple(sorted(chosen))
 
 
 def expected(options: argparse.Namespace) -> Iterator[Job]:

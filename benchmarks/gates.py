@@ -16,6 +16,7 @@ Each gate has a process of its own, and takes a minute for twenty pictures.
 
 from __future__ import annotations
 
+import argparse
 import ast
 import csv
 import json
@@ -402,26 +403,28 @@ def commit() -> str:
     return done.stdout.strip() or 'unknown'
 
 
-def main() -> None:
+def measure(options: argparse.Namespace) -> report.Report:
+    """Return the figures of the detectors, gates and pictures that are asked for."""
+    found = []
+    for detector in options.detectors:
+        some = list(pictures(detector, options.seeds, options.yardstick, options.pictures))
+        gates = [it for it in GATES[detector] if chosen(f'{it.about} {it.place}', options.gates)]
+        if some and gates:
+            with tempfile.TemporaryDirectory() as folder:
+                named = written(some, Path(folder))
+                found.append(measured(detector, named, gates, Path(folder)))
+    return {'commit': commit(), 'detectors': found}
+
+
+def main() -> int:
     """Print a table for each detector."""
     parser = report.parser(__doc__)
     parser.add_argument('--detectors', nargs='+', choices=sorted(GATES), default=list(GATES))
     parser.add_argument('--gates', nargs='+', default=[], metavar='TEXT', help='default: all')
     parser.add_argument('--pictures', nargs='+', default=[], metavar='TEXT', help='default: all')
     parser.add_argument('--yardstick', type=Path, default=YARDSTICK, metavar='FOLDER')
-    options = report.parsed(parser)
-    found = []
-    for detector in options.detectors:
-        some = list(pictures(detector, options.seeds, options.yardstick, options.pictures))
-        gates = [it for it in GATES[detector] if chosen(f'{it.about} {it.place}', options.gates)]
-        if not some or not gates:
-            continue
-        with tempfile.TemporaryDirectory() as folder:
-            named = written(some, Path(folder))
-            found.append(measured(detector, named, gates, Path(folder)))
-    figures = report.about(options.seeds, commit=commit(), detectors=found)
-    report.publish(figures, markdown(figures), options)
+    return report.run(parser, measure, markdown)
 
 
 if __name__ == '__main__':
-    main()
+    sys.exit(main())

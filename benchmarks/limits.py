@@ -21,6 +21,7 @@ import argparse
 import sys
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import product
 from typing import Any
 
 from ahf_ros.codes.families import FAMILY_NAMES
@@ -125,6 +126,28 @@ def case(options: argparse.Namespace, row: str, light: str) -> Case:
     return Case(row, light, make, options.family)
 
 
+def cells(options: argparse.Namespace) -> list[tuple[str, str]]:
+    """Return rows and lights of a group: those that are asked for, or all."""
+    rows, lights = GROUPS[options.group]
+    if foreign := [row for row in options.rows or () if row not in rows]:
+        raise report.Unacceptable(
+            f'rows has {foreign[0]!r}, accepted are those of the group {options.group!r}'
+        )
+    return list(product(options.rows or rows, options.lights or lights))
+
+
+def measure(options: argparse.Namespace) -> report.Report:
+    """Return the figures of the chosen rows under the chosen lights."""
+    run = detector(options.detector, ahf=options.ahf)
+    cases = [case(options, *cell) for cell in cells(options)]
+    measures = measured(cases, options.seeds, {'': run})
+    return {
+        'method': options.detector + (' with AHF' if options.ahf else ''),
+        **{name: getattr(options, name) for name in ('family', 'setting', 'group')},
+        'rows': [by[''].record() for by in measures],
+    }
+
+
 def cell_text(record: dict[str, Any]) -> str:
     """Return a cell of the table."""
     text = f'{record["right"]}'
@@ -142,17 +165,13 @@ def markdown(figures: report.Report) -> str:
         of_row = [records[name, light] for light in lights]
         slowest = number(max(of['seconds'] for of in of_row), 2)
         rows.append((name, of_row[0]['expected'], *map(cell_text, of_row), slowest))
-    right, expected, wrong, false = (
-        sum(of[key] for of in figures['rows'])
-        for key in ('right', 'expected', 'wrong', 'false_positives')
-    )
     lines = [
         f'{figures["method"]}, family {figures["family"]}, setting `{figures["setting"]}`. '
         + report.about_text(figures),
         '',
         *report.table(('right of N (NEES)', 'N', *lights, 's'), rows),
         '',
-        f'{right} of {expected} right, {wrong} wrong, {false} false.',
+        report.summary(figures['rows']),
     ]
     return '\n'.join(lines)
 
@@ -172,33 +191,9 @@ def parser() -> argparse.ArgumentParser:
     return made
 
 
-def chosen(arguments: Sequence[str] | None = None) -> argparse.Namespace:
-    """Return the options, with the rows and lights of the group where none are given."""
-    made = parser()
-    options = report.parsed(made, arguments)
-    rows, lights = GROUPS[options.group]
-    options.rows = options.rows or list(rows)
-    options.lights = options.lights or list(lights)
-    if foreign := [row for row in options.rows if row not in rows]:
-        made.error(f'rows has {foreign[0]!r}, accepted are those of the group {options.group!r}')
-    return options
-
-
 def main(arguments: Sequence[str] | None = None) -> int:
     """Measure and print."""
-    options = chosen(arguments)
-    figures = report.about(
-        options.seeds,
-        method=options.detector + (' with AHF' if options.ahf else ''),
-        family=options.family,
-        setting=options.setting,
-        group=options.group,
-    )
-    cases = [case(options, row, light) for row in options.rows for light in options.lights]
-    run = detector(options.detector, ahf=options.ahf)
-    figures['rows'] = [by[''].record() for by in measured(cases, options.seeds, {'': run})]
-    report.publish(figures, markdown(figures), options)
-    return 0
+    return report.run(parser(), measure, markdown, arguments)
 
 
 if __name__ == '__main__':

@@ -14,6 +14,8 @@ FOLDER has clones of the repositories of the photographs, see `benchmarks.photog
 
 from __future__ import annotations
 
+import argparse
+import sys
 from collections.abc import Iterator, Sequence
 from itertools import chain, pairwise, product
 from pathlib import Path
@@ -30,9 +32,9 @@ from ahf_ros.synthetic.bent.picture import render_bent
 from ahf_ros.synthetic.scene import SceneSettings, render
 from benchmarks import report
 from benchmarks.confidence import readings_of
-from benchmarks.photographs import TRUTH, photographs, picture, targets_of
 from support.pictures.bent import DOT_SHARES, HEIGHT, LIGHTS, WIDTH, settings
 from support.pictures.conditions import Scene, lit, photographed, sheets_bent, small
+from support.strangers import TRUTH, photographs, picture, targets_of
 
 BOUNDS = (0.5, 0.7, 0.9, 0.97, 1.0)
 """Of the classes of confidence."""
@@ -124,36 +126,29 @@ def records(readings: Iterator[Readings]) -> list[dict[str, Any]]:
 
 def markdown(figures: report.Report) -> str:
     """Return the report as a table."""
-    rows = []
-    for of in figures['rows']:
-        count = of['readings']
-        shares = [report.number(of[name] / count, 3) for name in ('expected', 'right')]
-        names = (of['kind'], of['maker'], of['confidence'])
-        rows.append((*names, count, of['right'], report.number(of['expected'], 1), *shares))
-    head = (
-        'kind',
-        'maker',
-        'confidence',
-        'readings',
-        'right',
-        'expected',
-        'stated',
-        'share right',
-    )
-    return '\n'.join([report.about_text(figures), '', *report.table(head, rows)])
+    columns: dict[str, report.Column] = {
+        **{name: name for name in ('kind', 'maker', 'confidence', 'readings', 'right')},
+        'expected': ('expected', 1),
+        'stated': lambda of: report.number(of['expected'] / of['readings'], 3),
+        'share right': lambda of: report.number(of['right'] / of['readings'], 3),
+    }
+    table = report.record_table(figures['rows'], columns)
+    return '\n'.join([report.about_text(figures), '', *table])
 
 
-def main(arguments: Sequence[str] | None = None) -> None:
+def measure(options: argparse.Namespace) -> report.Report:
+    """Return the figures of all makers; photographs only where their folder is given."""
+    drawn = (chain(rings(seed), others(seed)) for seed in options.seeds)
+    found = chain(strangers(options.folder) if options.folder else (), *drawn)
+    return {'rows': records(report.progress(found, 'images'))}
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
     """Measure and print."""
     made = report.parser(__doc__)
     made.add_argument('folder', type=Path, nargs='?', help='with the clones, as owner/name')
-    options = report.parsed(made, arguments)
-    rendered = (chain(rings(seed), others(seed)) for seed in options.seeds)
-    found = chain(strangers(options.folder) if options.folder else (), *rendered)
-    figures = report.about(options.seeds)
-    figures['rows'] = records(report.progress(found, 'images'))
-    report.publish(figures, markdown(figures), options)
+    return report.run(made, measure, markdown, arguments)
 
 
 if __name__ == '__main__':
-    main()
+    sys.exit(main())

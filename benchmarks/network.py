@@ -16,9 +16,10 @@ import numpy as np
 
 from ahf_ros.orientation.adjustment import adjust
 from ahf_ros.orientation.orient import orient
-from benchmarks import network_camcal, network_epochs, network_errors, network_starts
+from benchmarks import network_epochs, network_errors, network_starts
 from benchmarks.report import print_chosen
 from benchmarks.report import table as markdown
+from support import camcal
 from support.network_scenes import Field, approximate, simulate
 
 SIZES = (125, 250, 500, 1000)
@@ -66,8 +67,33 @@ def from_ids(seeds: Sequence[int]) -> list[str]:
     return markdown(head, [(*counts, f'{solution.sigma0:.3f}', f'{taken:.0f}')])
 
 
+def camcal_table() -> list[str]:
+    """Return the comparison as lines of Markdown."""
+    path = camcal.folder()
+    if path is None:
+        return ['`AHF_NETWORKS` names no folder with `camcal`.']
+    solution = camcal.solve(path)
+    values, deviations = camcal.in_dbat_units(solution)
+    theirs, their_deviations = camcal.dbat(path)
+    lines = [
+        f'sigma0 {solution.sigma0 / 10:.5f} px, redundancy {solution.redundancy}',
+        '',
+        '| parameter (mm) | here | DBAT | difference, sigma | sigma here | sigma DBAT | ratio |',
+        '|---|---|---|---|---|---|---|',
+    ]
+    names = ('cc', 'px', 'py', 'as', 'K1', 'K2', 'K3', 'P1', 'P2')
+    lines += [
+        f'| {name} | {mine:.8g} | {other:.8g} | {(mine - other) / size:+.3f} | {deviation:.3g} '
+        f'| {size:.3g} | {deviation / size:.3f} |'
+        for name, mine, other, deviation, size in zip(
+            names, values, theirs, deviations, their_deviations, strict=True
+        )
+    ]
+    return lines
+
+
 TABLES: dict[str, Callable[[int, int | None], list[str]]] = {
-    'camcal': lambda seed, runs: network_camcal.table(),
+    'camcal': lambda seed, runs: camcal_table(),
     'ellipsoids': lambda seed, runs: network_errors.ellipsoids_table([seed], runs or 125),
     'epochs': lambda seed, runs: network_epochs.table([seed], runs or network_epochs.RUNS),
     'optimum': lambda seed, runs: network_epochs.optimum_table([seed], runs or 20000),

@@ -43,8 +43,8 @@ from ahf_ros.synthetic.patterns import LIGHT_NAMES
 from ahf_ros.synthetic.scene import Rendering, SceneSettings, render
 from ahf_ros.target import Identification
 from benchmarks import report
-from benchmarks.preprocessors import PREPROCESSORS
 from benchmarks.report import number, table
+from support.preprocessors import PREPROCESSORS
 
 FAMILIES = {'ring': 'metashape12', 'traditional': 'metashape12', 'aruco': 'aruco_4x4_100'}
 """Ring targets as in the paper, and a dictionary with as many markers as there are targets."""

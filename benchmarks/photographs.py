@@ -15,63 +15,23 @@ from a clone of its repository, and identified by itself, with its family named 
 from __future__ import annotations
 
 import argparse
-import json
-import subprocess
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 
 from ahf_ros import FAMILY_NAMES, identify
 from ahf_ros.codes.families import AUTO
 from ahf_ros.evaluation import RIGHT, judge, score
-from ahf_ros.target import Target, TrueTarget
+from ahf_ros.target import Target
 from benchmarks import report
-
-TRUTH = Path(__file__).parent / 'truth'
-"""What photographs show, and the families that the package does not have."""
+from support.strangers import TRUTH, Photograph, photographs, picture, targets_of
 
 NAMED = 'named'
 WAYS = (NAMED, AUTO)
 """Ways to say which family a picture shows."""
-
-Photograph = dict[str, Any]
-
-
-def photographs() -> list[Photograph]:
-    """Return what all photographs show."""
-    every: list[Photograph] = json.loads((TRUTH / 'photographs.json').read_text())
-    return every
-
-
-def targets_of(shown: Photograph) -> list[TrueTarget]:
-    """Return the targets of a photograph."""
-    counted = [TrueTarget(*it) for it in shown['targets']]
-    others = [TrueTarget(no, x, y, confirmed=False) for no, x, y in shown.get('uncounted', ())]
-    return counted + others
-
-
-def picture(folder: Path, shown: Photograph) -> np.ndarray:
-    """Return a photograph in gray, from the clone of its repository.
-
-    Raises
-    ------
-    ValueError
-        If there is no clone, or if it does not have this picture.
-    """
-    clone = folder / shown['repository']
-    command = ['git', '-C', str(clone), 'cat-file', 'blob', shown['blob']]
-    git = subprocess.run(command, capture_output=True, check=False)
-    if git.returncode:
-        raise ValueError(
-            f'{clone} has no {shown["path"]} ({shown["blob"]}), accepted is a clone of '
-            f'https://github.com/{shown["repository"]}'
-        )
-    gray = cv2.imdecode(np.frombuffer(git.stdout, np.uint8), cv2.IMREAD_GRAYSCALE)
-    return np.asarray(gray)
 
 
 def identified(image: np.ndarray, family: str) -> Sequence[Target]:
@@ -131,6 +91,19 @@ def _total(rows: Sequence[dict[str, Any]], way: str) -> str:
     return f'{way}: {right} of {expected} right, {wrong} wrong, {false} false in {len(some)}.'
 
 
+def measure(options: argparse.Namespace) -> report.Report:
+    """Return the figures of the photographs of the repositories that are asked for."""
+    some = [shown for shown in photographs() if shown['repository'] in options.repositories]
+    try:
+        rows = [
+            record(picture(options.folder, shown), shown, options.families)
+            for shown in report.progress(some, 'photographs')
+        ]
+    except ValueError as error:
+        raise report.Unacceptable(error) from error
+    return {'ways': list(options.families), 'rows': rows}
+
+
 def parser() -> argparse.ArgumentParser:
     """Return what can be chosen."""
     known = sorted({shown['repository'] for shown in photographs()})
@@ -143,19 +116,7 @@ def parser() -> argparse.ArgumentParser:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Measure and print."""
-    made = parser()
-    options = made.parse_args(arguments)
-    some = [shown for shown in photographs() if shown['repository'] in options.repositories]
-    rows: list[dict[str, Any]] = []
-    try:
-        for shown in report.progress(some, 'photographs'):
-            image = picture(options.folder, shown)
-            rows.append(record(image, shown, options.families))
-    except ValueError as error:
-        made.error(str(error))
-    figures = {'ways': list(options.families), 'machine': report.machine(), 'rows': rows}
-    report.publish(figures, markdown(figures), options)
-    return 0
+    return report.run(parser(), measure, markdown, arguments)
 
 
 if __name__ == '__main__':

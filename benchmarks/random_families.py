@@ -8,6 +8,8 @@ family. Seeds from 301 on are for tests, those below 100 for development.
 
 from __future__ import annotations
 
+import argparse
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -83,9 +85,8 @@ def measured(seed: int, file: Path) -> tuple[dict[int, list[tuple[bool, ...]]], 
     return learnt, {light: total(of) for light, of in scores.items()}
 
 
-def main(arguments: Sequence[str] | None = None) -> None:
-    """Print both tables as Markdown."""
-    options = report.parsed(report.parser(__doc__), arguments)
+def measure(options: argparse.Namespace) -> report.Report:
+    """Return both tables of all seeds: what was learnt, and what was identified."""
     learnt: dict[int, list[tuple[bool, ...]]] = {count: [] for count in LEARNT_FROM}
     scores: dict[str, list[Score]] = {light: [] for light in LIGHTS}
     with TemporaryDirectory() as folder:
@@ -95,35 +96,35 @@ def main(arguments: Sequence[str] | None = None) -> None:
                 learnt[count] += rows
             for light, of in by_light.items():
                 scores[light].append(of)
-    names = (
-        'targets',
-        'families',
-        'bits right',
-        'radii within 0.03',
-        'all words right',
-        'rule right',
-        'or named',
-    )
-    figures = report.about(
-        options.seeds,
-        learnt=table(
-            names,
+    sums = ((light, total(of)) for light, of in scores.items())
+    return {
+        'learnt': table(
+            (
+                *('targets', 'families', 'bits right', 'radii within 0.03', 'all words right'),
+                *('rule right', 'or named'),
+            ),
             [
                 (count, len(rows), *(sum(of) for of in zip(*rows, strict=True)))
                 for count, rows in learnt.items()
             ],
         ),
-        identified=table(
+        'identified': table(
             ('light', 'targets', 'right', 'wrong', 'false positives'),
-            [
-                (light, of.expected, of.right, of.wrong, of.false_positives)
-                for light, of in ((light, total(of)) for light, of in scores.items())
-            ],
+            [(light, of.expected, of.right, of.wrong, of.false_positives) for light, of in sums],
         ),
-    )
-    page = [report.about_text(figures), '', *figures['learnt'], '', *figures['identified']]
-    report.publish(figures, '\n'.join(page), options)
+    }
+
+
+def markdown(figures: report.Report) -> str:
+    """Return both tables as a page."""
+    lines = [report.about_text(figures), '', *figures['learnt'], '', *figures['identified']]
+    return '\n'.join(lines)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Measure and print."""
+    return report.run(report.parser(__doc__), measure, markdown, arguments)
 
 
 if __name__ == '__main__':
-    main()
+    sys.exit(main())

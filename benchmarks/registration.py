@@ -16,18 +16,15 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ahf_ros.interchange.cloud_files import AXES
-from ahf_ros.localisation import positions
 from ahf_ros.orientation.network import FloatArray
 from ahf_ros.orientation.pose import Pose
 from ahf_ros.orientation.single_image import resect
 from ahf_ros.orientation.transform import Transform
 from ahf_ros.registration.scan import Scan
 from ahf_ros.registration.session import Registration
-from ahf_ros.target import Target
 from benchmarks.report import print_chosen
 from support.poses import CAMERA, View, normalised_square, view, with_wrong_id
-from support.scans import measured, ring, squared_error, station
+from support.scans import clouds, drawn, ring, squared_error, station
 
 FIELDS = {
     'plane': (1.0, 0.0),
@@ -119,12 +116,6 @@ COUNT = 20
 COMMON = 6
 """Number of targets that two neighbours share."""
 
-SIGMA = 20e-6  # m, of the targets that are drawn
-NOISE = 0.1e-3  # m, of the points of a cloud
-FOCAL_LENGTH = 2500.0  # px
-DOT = 8.0  # px, radius
-CENTRE = 0.03  # px, standard deviation of the centres
-
 Measure = Callable[[Sequence[str], FloatArray, Transform, np.random.Generator], Scan]
 
 
@@ -139,48 +130,6 @@ class Figures:
     after: list[float] = field(default_factory=list)
     sigma0: list[float] = field(default_factory=list)
     refused: int = 0
-
-
-def drawn(
-    names: Sequence[str], points: FloatArray, pose: Transform, random: np.random.Generator
-) -> Scan:
-    """Return targets with errors drawn from their covariances."""
-    return measured(names, points, pose, SIGMA, random)
-
-
-def clouds(
-    names: Sequence[str], points: FloatArray, pose: Transform, random: np.random.Generator
-) -> Scan:
-    """Return targets that are measured in clouds; their planes face away from the axis."""
-    places, covariances = [], []
-    for point in points:
-        normal = pose.rotation.T @ (point * (1, 1, 0))
-        place, covariance = _in_cloud(pose.inverse.moved(point), normal, random)
-        places.append(place)
-        covariances.append(covariance)
-    return Scan(tuple(names), np.array(places), np.array(covariances))
-
-
-def _in_cloud(
-    true: FloatArray, normal: FloatArray, random: np.random.Generator
-) -> tuple[FloatArray, FloatArray]:
-    """Return position and covariance of a target from the points around it."""
-    centre = FOCAL_LENGTH * true[:2] / true[2]
-    first = np.round(centre) - 3 * DOT - 2
-    size = int(6 * DOT + 5)
-    rows, columns = np.mgrid[:size, :size]
-    pixels = np.stack((columns, rows), axis=-1) + first
-    rays = np.concatenate((pixels / FOCAL_LENGTH, np.ones((size, size, 1))), axis=-1)
-    depth = (true @ normal) / (rays @ normal)
-    depth += NOISE * random.standard_normal(depth.shape)
-    cloud = np.zeros((size, size), [(name, '<f4') for name in AXES])
-    for axis, name in enumerate(AXES):
-        cloud[name] = rays[..., axis] * depth
-    x, y = centre + CENTRE * random.standard_normal(2)
-    seen = x - first[0], y - first[1]
-    target = Target(1, 1, *seen, DOT, DOT, covariance=(CENTRE**2, 0.0, 0.0, CENTRE**2))
-    found = positions(cloud, [target])
-    return found.points[0], found.covariances[0]
 
 
 def registered(measure: Measure, seed: int, runs: int) -> Figures:

@@ -19,6 +19,12 @@ FIRST_TEST_SEED = 101
 """Seeds below this one are for development: nothing was chosen by looking at the others."""
 
 Report = dict[str, Any]
+
+
+class Unacceptable(ValueError):
+    """Something is wrong with options or with what they name; it is said as usage."""
+
+
 Item = TypeVar('Item')
 
 
@@ -63,10 +69,39 @@ def parsed(
     """Return the options; the program ends where seeds for tests and for development mix."""
     options = made.parse_args(arguments)
     try:
-        are_tests(options.seeds)
+        are_tests(getattr(options, 'seeds', ()))
     except ValueError as error:
         made.error(str(error))
     return options
+
+
+def run(
+    made: argparse.ArgumentParser,
+    measure: Callable[[argparse.Namespace], Report],
+    page: Callable[[Report], str],
+    arguments: Sequence[str] | None = None,
+) -> int:
+    """Measure what the command line asks for, and print and write it: a whole benchmark.
+
+    Parameters
+    ----------
+    made : argparse.ArgumentParser
+        Made by `parser`.
+    measure : callable
+        Returns figures for the options; the machine and the seeds are added.
+    page : callable
+        Returns the figures in Markdown.
+    arguments : sequence of str, optional
+        By default those of the process.
+    """
+    options = parsed(made, arguments)
+    always = about(options.seeds) if 'seeds' in options else {'machine': machine()}
+    try:
+        figures = {**always, **measure(options)}
+    except Unacceptable as error:
+        made.error(str(error))
+    publish(figures, page(figures), options)
+    return 0
 
 
 def are_tests(seeds: Sequence[int]) -> bool:
@@ -115,6 +150,30 @@ def table(head: Sequence[object], rows: Iterable[Sequence[object]]) -> list[str]
     """Return the lines of a table in Markdown."""
     first, *others = (f'| {" | ".join(map(str, row))} |' for row in (head, *rows))
     return [first, '|---' * len(head) + '|', *others]
+
+
+Column = str | tuple[str, int] | Callable[[Report], object]
+"""A cell of a record: the value of a name, with some digits, or what a function makes of it."""
+
+
+def record_table(records: Iterable[Report], columns: Mapping[str, Column]) -> list[str]:
+    """Return the lines of a table of records in Markdown, whose head says what is in a column."""
+
+    def cell(record: Report, column: Column) -> object:
+        if callable(column):
+            return column(record)
+        return record[column] if isinstance(column, str) else number(record[column[0]], column[1])
+
+    rows = [[cell(record, column) for column in columns.values()] for record in records]
+    return table(list(columns), rows)
+
+
+def summary(records: Sequence[Report]) -> str:
+    """Return the sums of right, wrong and false reports of all records as a sentence."""
+    right, expected, wrong, false = (
+        sum(of[key] for of in records) for key in ('right', 'expected', 'wrong', 'false_positives')
+    )
+    return f'{right} of {expected} right, {wrong} wrong, {false} false.'
 
 
 def number(value: float | None, digits: int, none: str = '-') -> str:

@@ -9,8 +9,11 @@ where the target is not identified. No limits of size are set. Seeds from 101 on
 
 from __future__ import annotations
 
+import argparse
 import math
+import sys
 from collections.abc import Iterator, Sequence
+from itertools import product
 from typing import Any
 
 from ahf_ros.detectors import create_detector
@@ -35,13 +38,17 @@ LIGHTS = {'normal': 0.3, 'stripe': 0.12, 'lattice': 0.12}
 TILTS = (0.0, 40.0)
 
 
-def measure(families: Sequence[str], lights: Sequence[str], seed: int) -> Iterator[dict[str, Any]]:
+def measure(options: argparse.Namespace) -> report.Report:
+    """Return the figures of all families, lights and tilts."""
+    return {'rows': list(records(options))}
+
+
+def records(options: argparse.Namespace) -> Iterator[dict[str, Any]]:
     """Render and identify an image of each family, light and tilt; yield its row."""
-    cells = [(family, light, tilt) for family in families for light in lights for tilt in TILTS]
+    cells = [*product(options.families, options.lights, TILTS)]
     for family, light, tilt in report.progress(cells, 'images'):
-        shown = collage(
-            RADII[family], family, light=light, ambient=LIGHTS[light], tilt=tilt, seed=seed
-        )
+        scene = {'light': light, 'ambient': LIGHTS[light], 'tilt': tilt}
+        shown = collage(RADII[family], family, seed=options.seeds[0], **scene)
         found = create_detector(family=family)(shown.image)
         figures = score(shown.truth, found)
         errors = {
@@ -78,17 +85,14 @@ def markdown(figures: report.Report) -> str:
     return '\n'.join([report.about_text(figures), '', *report.table(head, rows)])
 
 
-def main(arguments: Sequence[str] | None = None) -> None:
+def main(arguments: Sequence[str] | None = None) -> int:
     """Measure and print."""
     made = report.parser(__doc__, seeds=False)
     made.add_argument('--families', nargs='+', choices=tuple(RADII), default=tuple(RADII))
     made.add_argument('--lights', nargs='+', choices=tuple(LIGHTS), default=tuple(LIGHTS))
-    made.add_argument('--seed', type=int, default=FIRST_TEST_SEED)
-    options = made.parse_args(arguments)
-    figures = report.about([options.seed])
-    figures['rows'] = list(measure(options.families, options.lights, options.seed))
-    report.publish(figures, markdown(figures), options)
+    made.add_argument('--seed', type=int, default=[FIRST_TEST_SEED], nargs=1, dest='seeds')
+    return report.run(made, measure, markdown, arguments)
 
 
 if __name__ == '__main__':
-    main()
+    sys.exit(main())

@@ -13,8 +13,10 @@ pupil-apriltags is left out where it is not installed. Seeds from 101 on are for
 
 from __future__ import annotations
 
+import argparse
+import sys
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -22,16 +24,12 @@ import cv2
 import numpy as np
 from scipy.optimize import least_squares
 
-from ahf_ros.codes.square import dictionary
-from ahf_ros.detectors import create_detector
-from ahf_ros.detectors.square.frames import centres
 from ahf_ros.evaluation import score
 from ahf_ros.synthetic.scene import SceneSettings, render
-from ahf_ros.target import Target
 from benchmarks import report
 from benchmarks.report import number
+from support.square_readers import FAMILY, readers
 
-FAMILY = 'apriltag_36h11'
 SCENES: dict[str, dict[str, Any]] = {
     'even light': {},
     'tilt 45 deg': {'tilt': 45.0},
@@ -45,50 +43,8 @@ SCENES: dict[str, dict[str, Any]] = {
     'lattice 0.3': {'light': 'lattice'},
 }
 
-Reader = Callable[[np.ndarray], list[Target]]
 
-
-def readers() -> dict[str, Reader]:
-    """Return functions that find markers in images of uint8."""
-    parameters = cv2.aruco.DetectorParameters()
-    parameters.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_SUBPIX
-    opencv = cv2.aruco.ArucoDetector(dictionary(FAMILY), parameters)
-
-    def by_opencv(image: np.ndarray) -> list[Target]:
-        corners, numbers, _ = opencv.detectMarkers(image)
-        return _targets([] if numbers is None else numbers.ravel().tolist(), corners)
-
-    found: dict[str, Reader] = {'ahf': create_detector(family=FAMILY), 'opencv': by_opencv}
-    try:
-        from pupil_apriltags import Detector
-    except ImportError:
-        return found
-
-    class Kept(Detector):
-        """Never released, as that reads what it has freed (pupil-labs/apriltags, pull 65)."""
-
-        def __del__(self) -> None:
-            pass
-
-    pupil = Kept(families='tag36h11', quad_decimate=1.0)
-
-    def by_pupil(image: np.ndarray) -> list[Target]:
-        tags = pupil.detect(image)
-        # There, (0, 0) is the corner of the first pixel.
-        return _targets([tag.tag_id for tag in tags], [tag.corners - 0.5 for tag in tags])
-
-    return found | {'pupil-apriltags': by_pupil}
-
-
-def _targets(numbers: Sequence[int], corners: Sequence[np.ndarray]) -> list[Target]:
-    middles = centres(np.reshape(corners, (-1, 4, 2)).astype(np.float64))
-    return [
-        Target(int(of), int(of), float(x), float(y), 1.0, 1.0)
-        for of, (x, y) in zip(numbers, middles, strict=True)
-    ]
-
-
-def measure(seeds: Sequence[int]) -> Iterator[dict[str, Any]]:
+def in_scenes(seeds: Sequence[int]) -> Iterator[dict[str, Any]]:
     """Render scenes and yield what each reader finds in them."""
     found = readers()
     for name, changes in report.progress(SCENES.items(), 'scenes', len(SCENES)):
@@ -152,33 +108,36 @@ def grid_rms(ids: np.ndarray, columns: int, places: np.ndarray, shape: tuple[int
 
 def markdown(figures: report.Report) -> str:
     """Return the report as tables."""
-    rows = []
-    for row in figures['rows']:
-        right, milliseconds = f'{row["right"]} of {row["expected"]}', 1000 * row['seconds']
-        cells = (right, row['wrong'], number(row['rms'], 4), number(milliseconds, 0))
-        rows.append((row['scene'], row['reader'], *cells))
-    head = ('scene', 'reader', 'right', 'wrong, false', 'RMS, px', 'ms')
-    lines = [report.about_text(figures), '', *report.table(head, rows)]
-    if figures.get('photographs'):
-        head = tuple(figures['photographs'][0])
-        counts = [tuple(row.values()) for row in figures['photographs']]
-        lines += ['', *report.table(head, counts)]
+    columns: dict[str, report.Column] = {
+        'scene': 'scene',
+        'reader': 'reader',
+        'right': lambda row: f'{row["right"]} of {row["expected"]}',
+        'wrong, false': 'wrong',
+        'RMS, px': ('rms', 4),
+        'ms': lambda row: number(1000 * row['seconds'], 0),
+    }
+    lines = [report.about_text(figures), '', *report.record_table(figures['rows'], columns)]
+    if photographs := figures.get('photographs'):
+        lines += ['', *report.record_table(photographs, {name: name for name in photographs[0]})]
     return '\n'.join(lines)
 
 
-def main(arguments: Sequence[str] | None = None) -> None:
+def measure(options: argparse.Namespace) -> report.Report:
+    """Return what readers find in scenes, and in photographs where a folder is given."""
+    figures: report.Report = {'rows': list(in_scenes(options.seeds))}
+    if options.photographs:
+        columns, rows = map(int, options.grid.split('x'))
+        figures['photographs'] = list(photographed(options.photographs, columns, rows))
+    return figures
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
     """Measure and print."""
     made = report.parser(__doc__)
     made.add_argument('--photographs', type=Path, help='a folder of photographs of tag36h11')
     made.add_argument('--grid', default='6x6', help='its columns and rows; default: %(default)s')
-    options = report.parsed(made, arguments)
-    columns, rows = map(int, options.grid.split('x'))
-    figures = report.about(options.seeds)
-    figures['rows'] = list(measure(options.seeds))
-    if options.photographs:
-        figures['photographs'] = list(photographed(options.photographs, columns, rows))
-    report.publish(figures, markdown(figures), options)
+    return report.run(made, measure, markdown, arguments)
 
 
 if __name__ == '__main__':
-    main()
+    sys.exit(main())

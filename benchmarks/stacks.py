@@ -15,6 +15,7 @@ import time
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -34,9 +35,15 @@ COLUMNS = ('first image', 'stack', 'normal light')
 AMBIENT = 0.02
 
 
-def measure(options: argparse.Namespace) -> Iterator[dict[str, Any]]:
+def measure(options: argparse.Namespace) -> report.Report:
+    """Return the figures of all sizes and lights."""
+    rows = list(records(options))
+    return {'phases': options.phases, 'targets': options.targets, 'rows': rows}
+
+
+def records(options: argparse.Namespace) -> Iterator[dict[str, Any]]:
     """Yield the figures of each size and light: of one image, of the stack, in normal light."""
-    cells = [(radius, light) for radius in options.radii for light in options.lights]
+    cells = [*product(options.radii, options.lights)]
     for radius, light in report.progress(cells, 'scenes'):
         rows = {column: Row(f'radius {radius:g}', light) for column in COLUMNS}
         chosen: Counter[str] = Counter()
@@ -77,27 +84,27 @@ def identified(images: list[np.ndarray], expected: int) -> tuple[list[Identifica
 
 def markdown(figures: report.Report) -> str:
     """Return the report as a table."""
-    numbers = ('RMSE px', 'in normal light', 'NEES', 's')
-    head = ('radius', 'light', *COLUMNS, 'parts', *numbers, 'combination')
-    rows = []
-    for row in figures['rows']:
-        counts = [
-            f'{of["right"]} / {of["wrong"]} / {of["false_positives"]}'
-            for of in (row[column] for column in COLUMNS)
-        ]
-        stack, normal = row['stack'], row['normal light']
-        errors = number(stack['rmse_xy'], 4), number(normal['rmse_xy'], 4)
-        others = number(stack['nees'], 1), number(stack['seconds'], 1)
-        names = ', '.join(sorted(row['combinations']))
-        start = (f'{row["radius"]:g}', row['light'])
-        rows.append((*start, *counts, row['parts'], *errors, *others, names))
-    lines = [
+
+    def counts(column: str) -> report.Column:
+        keys = ('right', 'wrong', 'false_positives')
+        return lambda row: ' / '.join(f'{row[column][key]}' for key in keys)
+
+    columns: dict[str, report.Column] = {
+        'radius': lambda row: f'{row["radius"]:g}',
+        'light': 'light',
+        **{column: counts(column) for column in COLUMNS},
+        'parts': 'parts',
+        'RMSE px': lambda row: number(row['stack']['rmse_xy'], 4),
+        'in normal light': lambda row: number(row['normal light']['rmse_xy'], 4),
+        'NEES': lambda row: number(row['stack']['nees'], 1),
+        's': lambda row: number(row['stack']['seconds'], 1),
+        'combination': lambda row: ', '.join(sorted(row['combinations'])),
+    }
+    about = (
         f'{figures["phases"]} phases, ambient light {AMBIENT:g}, {figures["targets"]} targets an '
-        f'image; right / wrong / false. {report.about_text(figures)}',
-        '',
-        *report.table(head, rows),
-    ]
-    return '\n'.join(lines)
+        f'image; right / wrong / false. {report.about_text(figures)}'
+    )
+    return '\n'.join([about, '', *report.record_table(figures['rows'], columns)])
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -106,14 +113,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     made.add_argument('--lights', nargs='+', choices=LIGHT_NAMES, default=LIGHTS)
     made.add_argument('--radii', nargs='+', type=float, default=[6.0, 20.0])
     made.add_argument('--phases', type=int, default=4)
-    made.add_argument('--targets', type=int, default=usual.targets)
-    made.add_argument('--width', type=int, default=usual.width)
-    made.add_argument('--height', type=int, default=usual.height)
-    options = report.parsed(made, arguments)
-    figures = report.about(options.seeds, phases=options.phases, targets=options.targets)
-    figures['rows'] = list(measure(options))
-    report.publish(figures, markdown(figures), options)
-    return 0
+    for name in ('targets', 'width', 'height'):
+        made.add_argument(f'--{name}', type=int, default=getattr(usual, name))
+    return report.run(made, measure, markdown, arguments)
 
 
 if __name__ == '__main__':

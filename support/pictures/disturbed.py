@@ -10,7 +10,8 @@ from functools import partial
 import cv2
 import numpy as np
 
-from ahf_ros.codes.ring import FAMILY_NAMES, family
+from ahf_ros.codes.cyclic import smallest_rotation
+from ahf_ros.codes.ring import FAMILY_NAMES, Family, family
 from ahf_ros.target import TrueTarget
 from support.pictures import occluders
 from support.pictures.exposure import Exposure
@@ -124,6 +125,33 @@ def overlapping(
         x, y = mark.plane @ (distance * np.array([math.cos(direction), math.sin(direction)]))
         truth.append(TrueTarget(number, mark.x + x, mark.y + y))
     return sheet.photograph(Exposure(occluder=papers)), truth
+
+
+def far_apart(code: Family, sectors: int, seed: int) -> tuple[int, ...]:
+    """Return IDs that cannot look alike, up to a number of sectors of each covered.
+
+    Parameters
+    ----------
+    code : Family
+    sectors : int
+        Largest number of neighbouring sectors that are covered.
+    seed : int
+        Of the order in which IDs are tried.
+    """
+    windows = [
+        sum(1 << (start + step) % code.bits for step in range(count))
+        for count in range(sectors + 1)
+        for start in range(code.bits)
+    ]
+    seen: set[int] = set()
+    chosen = []
+    for index in np.random.default_rng([seed, 8]).permutation(len(code.words)).tolist():
+        left = code.words[index] & ~np.array(windows)
+        looks = set(smallest_rotation(left, code.bits).tolist())
+        if not looks & seen:
+            chosen.append(index + 1)
+            seen |= looks
+    return tuple(sorted(chosen))
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from itertools import product
 
 import numpy as np
 import pytest
@@ -16,14 +15,14 @@ from benchmarks import limits
 def test_every_row_is_a_scene_that_can_be_made(family, setting):
     options = ['--family', family, '--targets', '50', '--setting', setting]
     for group, count, twice in (('light', 32, 0), ('edge shift', 64, 8), ('exposure', 6, 0)):
-        made = limits.chosen([*options, '--group', group])
-        cells = list(product(made.rows, made.lights))
+        made = limits.parser().parse_args([*options, '--group', group])
+        cells = limits.cells(made)
         scenes = {limits.scene(made, row, light, 1) for row, light in cells}
         assert (len(cells), len(cells) - len(scenes)) == (count, twice)  # one half of an image
 
 
 def test_the_halves_of_an_image_may_be_shifted_in_opposite_directions():
-    made = limits.chosen(['--group', 'edge shift', '--targets', '20'])
+    made = limits.parser().parse_args(['--group', 'edge shift', '--targets', '20'])
     both, less = (
         limits.case(made, f'radius 10, {name} px', 'normal').make(1)[0]
         for name in ('-1 and +1', '-1')

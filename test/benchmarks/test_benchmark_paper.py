@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from benchmarks import paper
-from benchmarks.preprocessors import PREPROCESSORS
+from support.preprocessors import PREPROCESSORS
 
 SMALL = (
     '--quick --images 1 --seed 1 --jobs 1 --ambients 0.3 --evaluations 5 --lights normal stripe'

@@ -10,14 +10,15 @@ import pytest
 from ahf_ros import FAMILY_NAMES, SceneSettings, render
 from ahf_ros.codes.families import print_in
 from benchmarks import photographs
+from support import strangers
 
 
 def test_the_truth_names_pictures_and_families_that_can_be_read():
-    every = photographs.photographs()
+    every = strangers.photographs()
     assert len({shown['blob'] for shown in every}) == len(every) > 40
     for shown in every:
         new = shown['family'] not in FAMILY_NAMES
-        file = str(photographs.TRUTH / f'{shown["family"]}.json') if new else ''
+        file = str(strangers.TRUTH / f'{shown["family"]}.json') if new else ''
         ids = {target[0] for target in shown['targets']}
         assert ids <= set(print_in(shown['family'], file).design.all_ids)
 
@@ -47,7 +48,7 @@ def clone(tmp_path):
 
 def test_a_picture_is_read_from_its_clone_and_scored(clone):
     folder, shown = clone
-    image = photographs.picture(folder, shown)
+    image = strangers.picture(folder, shown)
     record = photographs.record(image, shown, photographs.WAYS)
     of = {'right': 2, 'wrong': 0, 'false': 0, 'missed': []}
     assert record['by'] == {'named': of, 'auto': of}
@@ -59,7 +60,7 @@ def test_a_picture_is_read_from_its_clone_and_scored(clone):
 def test_a_picture_that_is_not_there_says_what_to_clone(clone, capsys):
     folder, shown = clone
     with pytest.raises(ValueError, match=r'no other\.png.*github\.com/somebody/pictures'):
-        photographs.picture(folder, {**shown, 'path': 'other.png', 'blob': '0' * 40})
+        strangers.picture(folder, {**shown, 'path': 'other.png', 'blob': '0' * 40})
     with pytest.raises(SystemExit):
         photographs.main([str(folder), '--repositories', 'elenasmar99/Coded_targets_recognition'])
     assert 'clone of https://github.com/elenasmar99' in capsys.readouterr().err

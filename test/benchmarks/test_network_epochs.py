@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from benchmarks.network_epochs import Epoch, Field, figures
+from benchmarks.network_epochs import figures
+from support.simulated_epochs import Epoch, Field
 
 FIELD = Field('small', (1.0, 0.8, 0.6), 8, 6)
 

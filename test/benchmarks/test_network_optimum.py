@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from benchmarks.network_epochs import PART, Field, located
+from benchmarks.network_epochs import PART, located
+from support.simulated_epochs import Field
 
 
 @pytest.mark.parametrize('bar', [True, False])

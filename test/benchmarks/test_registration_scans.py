@@ -2,7 +2,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from benchmarks.registration import COMMON, COUNT, clouds, registered
+from benchmarks.registration import COMMON, COUNT, registered
+from support.scans import clouds
 
 
 def test_a_chain_closes_within_its_covariance() -> None:

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from ahf_ros.codes import SQUARE_NAMES, VENDOR_NAMES
-from benchmarks.printed import identified, largest_error, sample, settings_of
 from support.command_line import ahf, status
 from support.disk import room_for
+from support.printed import identified, largest_error, sample, settings_of
 
 pytest.importorskip('reportlab', reason='PDF files are written by reportlab')
 pypdfium2 = pytest.importorskip('pypdfium2', reason='PDF files are rendered by pypdfium2')

@@ -17,9 +17,9 @@ from ahf_ros.evaluation import RIGHT, WRONG, judge
 from ahf_ros.features import frame
 from ahf_ros.features.pyramid import Octave, image_pyramid, octaves
 from ahf_ros.target import Target
-from benchmarks.disturbances import far_apart
 from support.drawn_dots import drawn, in_stripes
 from support.pictures import occluders
+from support.pictures.disturbed import far_apart
 from support.pictures.exposure import Exposure
 from support.pictures.sheets import target_sheet
 from support.ring import made_up

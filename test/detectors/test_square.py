@@ -14,10 +14,10 @@ from ahf_ros.session import identify
 from ahf_ros.settling import evident
 from ahf_ros.synthetic.scene import Rendering
 from ahf_ros.target import Target
-from benchmarks.squares import readers
 from support.pictures.textures import textured_image
 from support.scenes import around, counted, rendering
 from support.square_markers import needs_square_markers
+from support.square_readers import readers
 
 pytestmark = needs_square_markers
 FAMILY = 'aruco_4x4_50'

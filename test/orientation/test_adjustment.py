@@ -13,8 +13,8 @@ from ahf_ros.orientation.datum import Datum, movements
 from ahf_ros.orientation.network import CameraView, ControlPoint, ScaleBar
 from ahf_ros.orientation.refinement import refine
 from ahf_ros.orientation.similarity import similarity_between
-from benchmarks.network_camcal import dbat, folder, in_dbat_units, solve
 from benchmarks.network_errors import RELEASED, counted, coverage
+from support.camcal import dbat, folder, in_dbat_units, solve
 from support.network_scenes import Field, approximate, simulate
 
 pytest.importorskip('scipy')

@@ -139,31 +139,6 @@ def dbat(path: Path) -> tuple[np.ndarray, np.ndarray]:
     return np.concatenate(values), np.array(deviations)
 
 
-def table() -> list[str]:
-    """Return the comparison as lines of Markdown."""
-    path = folder()
-    if path is None:
-        return ['`AHF_NETWORKS` names no folder with `camcal`.']
-    solution = solve(path)
-    values, deviations = in_dbat_units(solution)
-    theirs, their_deviations = dbat(path)
-    lines = [
-        f'sigma0 {solution.sigma0 / 10:.5f} px, redundancy {solution.redundancy}',
-        '',
-        '| parameter (mm) | here | DBAT | difference, sigma | sigma here | sigma DBAT | ratio |',
-        '|---|---|---|---|---|---|---|',
-    ]
-    names = ('cc', 'px', 'py', 'as', 'K1', 'K2', 'K3', 'P1', 'P2')
-    lines += [
-        f'| {name} | {mine:.8g} | {other:.8g} | {(mine - other) / size:+.3f} | {deviation:.3g} '
-        f'| {size:.3g} | {deviation / size:.3f} |'
-        for name, mine, other, deviation, size in zip(
-            names, values, theirs, deviations, their_deviations, strict=True
-        )
-    ]
-    return lines
-
-
 def _rotation(angles: np.ndarray) -> np.ndarray:
     """Return the rotation to a frame with y down and z forward of omega, phi and kappa in rad."""
     (so, sp, sk), (co, cp, ck) = np.sin(angles), np.cos(angles)
