@@ -214,8 +214,7 @@ def _covariance(
     solver = np.linalg.pinv(flat.T @ flat, hermitian=True)[:3]
     gains = np.einsum('uk,nak->nua', solver, design) * (1 + unit @ perspective)[:, None, None]
     noise = _TRIMMED * residuals.T @ residuals / (count - _UNKNOWNS / 3)
-    covariance: np.ndarray = np.einsum('nua,ab,nvb->uv', gains, noise, gains, optimize=True)
-    return covariance
+    return np.einsum('nua,ab,nvb->uv', gains, noise, gains, optimize=True)
 
 
 def _rounding(position: np.ndarray) -> np.ndarray:

@@ -54,7 +54,7 @@ def change(place: str, expression: str) -> None:
             raise ValueError(f'{module} has no {name}') from None
         return compile(ast.fix_missing_locations(tree), loader.path, 'exec')
 
-    SourceFileLoader.get_code = get_code  # type: ignore[method-assign]
+    SourceFileLoader.get_code = get_code  # type: ignore[method-assign, assignment]
 
 
 def replace(tree: ast.Module, name: str, expression: str) -> None:
@@ -87,16 +87,14 @@ def assigned(scope: Scope) -> dict[str, Callable[[ast.expr], None]]:
     A name may be alone on the left, or one of as many names as there are values on the right.
     """
     found: dict[str, Callable[[ast.expr], None]] = {}
+    target: ast.expr
     for node in scope.body:
         if isinstance(node, ast.AnnAssign) and node.value is not None:
-            targets, value = [node.target], node.value
-        elif isinstance(node, ast.Assign):
-            targets, value = node.targets, node.value
+            target, value = node.target, node.value
+        elif isinstance(node, ast.Assign) and len(node.targets) == 1:
+            target, value = node.targets[0], node.value
         else:
             continue
-        if len(targets) != 1:
-            continue
-        target = targets[0]
         if isinstance(target, ast.Name):
             found[target.id] = partial(replace_value, node)
         elif isinstance(target, ast.Tuple) and isinstance(value, ast.Tuple):

@@ -33,7 +33,8 @@ DISTRACTORS = 100
 
 def counted(seeds: Sequence[int]) -> list[str]:
     """Return the table of estimates, and what they come to."""
-    rows, errors, ratios = [], [], []
+    rows, errors = [], []
+    ratios: list[float] = []
     usual, empty = SceneSettings(), SceneSettings(targets=0, distractors=DISTRACTORS)
     cases = [(usual, *light) for light in benchmark_lights()]
     cases += [(empty, *light) for light in EMPTY]

@@ -151,8 +151,8 @@ def families(options: argparse.Namespace) -> Iterator[Job]:
     folder = Path(os.environ.get('AHF_PHOTOS', PHOTOS)) / 'panel'
     if folder.exists():
         panel = read_truth(folder / 'truth.csv')
-        scenes = [(read_image(folder / name), truth) for name, truth in panel.items()]
-        yield from _read(options, 'photographs of aicon14', 'aicon14', scenes)
+        images = [(read_image(folder / name), truth) for name, truth in panel.items()]
+        yield from _read(options, 'photographs of aicon14', 'aicon14', images)
 
 
 def _read(

@@ -179,6 +179,7 @@ def pictures_of_folder(folder: Path, detector: str, texts: Sequence[str]) -> Ite
         name = f'yardstick {file_name}'
         if kind_of_detector(family) == detector and chosen(name, texts):
             image = cv2.imread(str(folder / 'images' / file_name), cv2.IMREAD_GRAYSCALE)
+            assert image is not None, file_name
             yield Picture(name, image, tuple(truth), family)
 
 
@@ -189,6 +190,7 @@ def photographs(texts: Sequence[str]) -> Iterator[Picture]:
         name = f'photograph {file_name}'
         if chosen(name, texts):
             image = cv2.imread(str(panel / file_name), cv2.IMREAD_GRAYSCALE)
+            assert image is not None, file_name
             truth = tuple((str(it.id), it.x, it.y) for it in targets)
             yield Picture(name, image, truth, 'aicon14')
 

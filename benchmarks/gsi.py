@@ -16,6 +16,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 from ahf_ros.detectors import create_detector
@@ -65,11 +66,17 @@ def without_targets() -> Iterator[Case]:
         yield rendered('no targets', f'{light} 0.3', scene)
     yield rendered('no targets', '100 distractors', replace(LARGE, targets=0, distractors=100))
     for count in range(10):
-        yield case(
-            f'texture {count}', lambda seed, count=count: (rough_image(100 * seed + count), ())
-        )
+        yield case(f'texture {count}', partial(_rough, count))
     for path in sorted((PHOTOS / 'panel').glob('*.png')):
-        yield case(f'photograph {path.stem}', lambda _, path=path: (read_image(path), ()))
+        yield case(f'photograph {path.stem}', partial(_photograph, path))
+
+
+def _rough(count: int, seed: int) -> Scene:
+    return rough_image(100 * seed + count), ()
+
+
+def _photograph(path: Path, _: int) -> Scene:
+    return read_image(path), ()
 
 
 SEARCHED = replace(LARGE, light='stripe', targets=20, width=2400, height=1600)

@@ -38,7 +38,7 @@ from support import PHOTOS
 PATIENCE = 600.0
 """Longest time for one image, s, of a command."""
 
-QUICK = {'width': 1200, 'height': 900, 'targets': 6}
+QUICK: dict[str, Any] = {'width': 1200, 'height': 900, 'targets': 6}
 
 GROUPS = ('light', 'family', 'polarity', 'tilt', 'radius', 'no targets', 'photographs')
 

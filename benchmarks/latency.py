@@ -137,7 +137,11 @@ class Stream:
         while not complete():
             count = len(self.answered)
             until = time.monotonic() + patience
-            if not self.wait(lambda count=count: len(self.answered) > count, until):
+
+            def another(count: int = count) -> bool:
+                return len(self.answered) > count
+
+            if not self.wait(another, until):
                 return False
         return True
 

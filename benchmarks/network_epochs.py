@@ -75,7 +75,7 @@ def figures(field: Field, bar: bool, runs: int, rng: np.random.Generator) -> dic
     against_others = differences(xyz, epochs[0].covariance + epochs[1].covariance, bar)
     degrees = sum(it.redundancy for it in epochs)
     critical = f.isf(LEVEL * 0.9 / field.targets, 3, degrees)
-    shares = {}
+    shares: dict[str, float] = {}
     for kind, sigmas in (('', against_others), ('conditional_', covariances)):
         hits, bounds = [], []
         for _ in range(runs // 4):

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -238,8 +239,7 @@ def _lenses(cameras: int, random: np.random.Generator) -> np.ndarray:
     signs = random.choice([-1, 1], (cameras, len(PARAMETERS)))
     sizes = 5 * 20 ** random.random((cameras, len(PARAMETERS)))
     middle = np.array([LENS[0], (WIDTH - 1) / 2, (HEIGHT - 1) / 2, *np.zeros(7)])
-    lenses: np.ndarray = middle + signs * sizes * sigma
-    return lenses
+    return middle + signs * sizes * sigma
 
 
 def still_table(seeds: Sequence[int], runs: int) -> list[str]:
@@ -327,13 +327,12 @@ def _disturbed(
 def _exact(network: Network, truth: Start) -> np.ndarray:
     """Return the image points (m, 2) without errors."""
     seen = network.observations
-    exact: np.ndarray = project(
+    return project(
         truth.calibrations[network.camera_of[seen.photograph]],
         truth.rotations[seen.photograph],
         truth.positions[seen.photograph],
         truth.points[seen.point],
     )
-    return exact
 
 
 def _rms(solution: Solution, truth: Start) -> float:
@@ -423,7 +422,7 @@ def _told(
     truth: Start,
     alone: MeasuredPoints,
     random: np.random.Generator,
-) -> tuple[dict[str, object], str, float]:
+) -> tuple[dict[str, Any], str, float]:
     """Return what is told, which of it is wrong, and by how many standard deviations.
 
     These are of what is told and of the photographs alone, together. Of `sigmas`, the first is

@@ -15,6 +15,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from itertools import product
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -119,7 +120,7 @@ def panel_table(network: Network, folder: Path) -> list[str]:
         truth = {row['id']: [float(row[axis]) for axis in 'xyz'] for row in csv.DictReader(file)}
     observed = network.observations
     plain = orient(network)[0]
-    rows = [(*_against(plain, truth), '-', '-')]
+    rows: list[tuple[Any, ...]] = [(*_against(plain, truth), '-', '-')]
     mixed = observed.point.copy()
     wrong = [40, 250, 500]
     for row in wrong:

@@ -49,7 +49,7 @@ from support.preprocessors import PREPROCESSORS
 FAMILIES = {'ring': 'metashape12', 'traditional': 'metashape12', 'aruco': 'aruco_4x4_100'}
 """Ring targets as in the paper, and a dictionary with as many markers as there are targets."""
 
-QUICK = {'width': 1200, 'height': 900, 'targets': 6}
+QUICK: dict[str, Any] = {'width': 1200, 'height': 900, 'targets': 6}
 
 PAPER: dict[str, dict[str, str]] = {
     'AM': {

@@ -13,6 +13,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 import numpy as np
 
@@ -35,21 +36,21 @@ RADII = (5.0, 30.0)
 """Smallest and largest radius of dots, px."""
 
 
-def rules_right(found: LearntFamily, rule: dict[str, object]) -> tuple[bool, bool]:
+def rules_right(found: LearntFamily, rule: dict[str, Any]) -> tuple[bool, bool]:
     """Return whether the most probable rules are right, and whether any that may hold are.
 
     Rules are the same if the same words follow them.
     """
     every = np.arange(1 << min(found.bits, 16))
 
-    def same(rules: dict[str, object]) -> bool:
-        either = [conforming(every, found.bits, **of) for of in (rules, rule)]
-        return rules == rule or (found.bits <= 16 and np.array_equal(*either))
+    def same(rules: dict[str, Any]) -> bool:
+        first, second = (conforming(every, found.bits, **of) for of in (rules, rule))
+        return rules == rule or (found.bits <= 16 and np.array_equal(first, second))
 
     return same(found.rules), any(same(rules) for rules, _ in found.likely)
 
 
-def learnt_rightly(image: np.ndarray, code: Family, rule: dict[str, object]) -> tuple[bool, ...]:
+def learnt_rightly(image: np.ndarray, code: Family, rule: dict[str, Any]) -> tuple[bool, ...]:
     """Return whether bits, radii, words, rule, or one that is named, were learnt from an image."""
     found = learn_families(find_bands([image], DetectorSettings()))
     if not found or found[0].bits != code.bits:

@@ -190,7 +190,7 @@ def outcome_table(
     names: dict[str, float], default: Outcome, tried: dict[str, list[Outcome]]
 ) -> str:
     """Return outcomes as Markdown."""
-    rows = [('none changed', '', default, default)]
+    rows: list[tuple[object, ...]] = [('none changed', '', default, default)]
     for name, outcomes in tried.items():
         rows.append((f'`{name.removeprefix("ahf_ros.")}`', f'{names[name]:g}', *outcomes))
     return '\n'.join(table(('constant', 'value', 'halved', 'doubled'), rows))

@@ -74,14 +74,15 @@ def photographed(folder: Path, columns: int, rows: int) -> Iterator[dict[str, An
     found = readers()
     for path in sorted(path for path in folder.iterdir() if path.suffix in ('.jpg', '.png')):
         image = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE)
+        assert image is not None, path
         read = {name: {it.id: (it.x, it.y) for it in of(image)} for name, of in found.items()}
         grids = {name: of for name, of in read.items() if of_grid.issuperset(of) and len(of) > 12}
         common = sorted(set.intersection(*map(set, grids.values()))) if grids else []
         row: dict[str, Any] = {'scene': path.name}
         for name, places in read.items():
             seen = np.array([places[number] for number in common]) if name in grids else None
-            fitted = (np.array(common), columns, seen, image.shape[:2])
-            rms = None if seen is None else grid_rms(*fitted)
+            shape = image.shape[0], image.shape[1]
+            rms = None if seen is None else grid_rms(np.array(common), columns, seen, shape)
             row |= {name: len(places), f'{name}, RMS, px': number(rms, 3)}
         yield row
 

@@ -39,7 +39,7 @@ def installed() -> dict[str, Distribution]:
 def licence(item: Distribution) -> str:
     """Return the licence that a package states in its metadata, or in package.xml of ROS."""
     about = item.metadata
-    stated = about.get('License-Expression') or about.get('License') or ''
+    stated = (about.get_all('License-Expression') or about.get_all('License') or [''])[0]
     if stated.strip() and len(stated) <= _MAXIMUM_LENGTH and '\n' not in stated:
         return stated.strip()
     classified = [

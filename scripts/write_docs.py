@@ -35,7 +35,7 @@ AHF_LIGHTS = ('normal 0.3', 'stripe 0.3', 'stripe 0.12', 'lattice 0.3', 'lattice
 
 def parameters(settings: type = DetectorNodeSettings) -> str:
     """Return the parameters of a node."""
-    rows = [('parameter', 'default', 'accepted', 'meaning')]
+    rows: list[tuple[str, ...]] = [('parameter', 'default', 'accepted', 'meaning')]
     rows += [parameter(item) for item in flat_parameters(settings)]
     return table(rows)
 
@@ -48,7 +48,7 @@ def parameter(item: Parameter) -> tuple[str, ...]:
 
 def interfaces() -> str:
     """Return the topics and services of the nodes."""
-    rows = [('node', '', 'name', 'type')]
+    rows: list[tuple[str, ...]] = [('node', '', 'name', 'type')]
     for node, about in NODES.items():
         for number, it in enumerate(about.interfaces):
             text = f'`{it.kind}`, {it.text}'
@@ -59,7 +59,7 @@ def interfaces() -> str:
 def drivers() -> str:
     """Return what the drivers of scanners publish."""
     head = 'driver', 'image', 'calibration', 'cloud', 'bytes per point, missing points', 'stamps'
-    rows = [(*head, 'QoS')]
+    rows: list[tuple[str, ...]] = [(*head, 'QoS')]
     for name, driver in DRIVERS.items():
         cells = (
             f'`{name}`: {driver.package}',
@@ -76,7 +76,9 @@ def drivers() -> str:
 
 def driver_settings() -> str:
     """Return what is to be set for each driver, in the node and in the driver."""
-    rows = [('driver', 'set in the detector', 'in `pose`', 'in the driver', 'what else to do')]
+    rows: list[tuple[str, ...]] = [
+        ('driver', 'set in the detector', 'in `pose`', 'in the driver', 'what else to do')
+    ]
     for name, driver in DRIVERS.items():
         settings = {'cloud': 'true', **driver.settings}
         if not driver.reliable:
@@ -95,7 +97,7 @@ def _assigned(values: Mapping[str, object]) -> str:
 def lights() -> str:
     """Return what `ring` identifies under every light."""
     figures = read('ring')
-    rows = [('light', *AMBIENT)]
+    rows: list[tuple[str, ...]] = [('light', *AMBIENT)]
     for light in LIGHT_NAMES:
         cells = [cell(figures.get(('light', f'{light} {ambient}'))) for ambient in AMBIENT]
         rows.append((light, *cells))
@@ -105,7 +107,7 @@ def lights() -> str:
 def summary() -> str:
     """Return what `traditional` identifies without and with AHF, and `ring`."""
     figures = [read(name) for name in ('traditional', 'traditional_ahf', 'ring')]
-    rows = [('light', '`traditional`', '`traditional` with AHF', '`ring`')]
+    rows: list[tuple[str, ...]] = [('light', '`traditional`', '`traditional` with AHF', '`ring`')]
     rows += [(light, *(cell(of['light', light]) for of in figures)) for light in AHF_LIGHTS]
     return table(rows)
 
@@ -119,7 +121,7 @@ def others() -> str:
         'no targets': '100 distractors, no target',
         'photographs': 'ten photographs',
     }
-    rows = [('', '', 'right', 'of', 'wrong', 'false', 'RMSE XY px')]
+    rows: list[tuple[str, ...]] = [('', '', 'right', 'of', 'wrong', 'false', 'RMSE XY px')]
     for (group, name), of in read('ring').items():
         if group in names:
             error = '' if of['rmse_xy'] is None else f'{of["rmse_xy"]:.3f}'

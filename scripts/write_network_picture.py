@@ -32,7 +32,7 @@ def main() -> int:
             browser.set_window_size(WIDTH, HEIGHT)
             browser.get((Path(folder) / 'report.html').as_uri())
             content = np.frombuffer(browser.get_screenshot_as_png(), np.uint8)
-    image = cv2.imdecode(content, cv2.IMREAD_COLOR)
+    image = np.asarray(cv2.imdecode(content, cv2.IMREAD_COLOR))
     _, encoded = cv2.imencode('.jpg', image, [cv2.IMWRITE_JPEG_QUALITY, QUALITY])
     PICTURE.write_bytes(encoded.tobytes())
     return 0

@@ -32,7 +32,7 @@ def extras(*names: str) -> dict[str, str]:
 
     The values are the accepted versions.
     """
-    found = {}
+    found: dict[str, str] = {}
     for requirement in (
         it for name in names for it in PROJECT['project']['optional-dependencies'][name]
     ):
@@ -101,9 +101,9 @@ def conda(text: str) -> str:
         ros = [f'ros-${{{{ distro }}}}-{it.replace("_", "-")}' for it in ours]
         items = [*sorted([*others, 'python']), *sorted(ros)]
         lines = ''.join(f'    - {it}\n' for it in items)
-        text = re.sub(
-            rf'(?<=^  {name}:\n)(    - .*\n)+', lambda _, new=lines: new, text, flags=re.MULTILINE
-        )
+        old = re.search(rf'^  {name}:\n((    - .*\n)+)', text, re.MULTILINE)
+        assert old, name
+        text = text.replace(old[1], lines)
     version = ElementTree.parse(ROOT / 'package.xml').findtext('version')
     return re.sub(r'(?<=^  version: )\d.*', str(version), text, flags=re.MULTILINE)
 

@@ -64,7 +64,8 @@ def photographed(page: Path) -> bytes:
             'document.getElementById("tab-search").click();'
         )
         content = np.frombuffer(browser.get_screenshot_as_png(), np.uint8)
-    _, encoded = cv2.imencode('.jpg', cv2.imdecode(content, 1), [cv2.IMWRITE_JPEG_QUALITY, 86])
+    image = np.asarray(cv2.imdecode(content, 1))
+    _, encoded = cv2.imencode('.jpg', image, [cv2.IMWRITE_JPEG_QUALITY, 86])
     return encoded.tobytes()
 
 

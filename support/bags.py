@@ -17,7 +17,13 @@ from ahf_ros.bag.registration import POINT_CLOUD
 from ahf_ros.synthetic.scene import SceneSettings, render
 
 STRING = 'std_msgs/msg/String'
-SCENE = {'width': 400, 'height': 300, 'targets': 4, 'dot_radius': 10.0, 'light': 'stripe'}
+SCENE: dict[str, Any] = {
+    'width': 400,
+    'height': 300,
+    'targets': 4,
+    'dot_radius': 10.0,
+    'light': 'stripe',
+}
 
 Recorded = tuple[str, str, int, Any]
 """Topic, type, time in ns, message."""
@@ -142,7 +148,7 @@ def cloud(store: Typestore, points: np.ndarray, time: int, **changes: Any) -> An
         'width': width,
         'fields': [
             field(name=name, offset=offset, datatype=7, count=1)
-            for name, (_, offset) in points.dtype.fields.items()
+            for name, (_, offset, *_) in (points.dtype.fields or {}).items()
         ],
         'is_bigendian': False,
         'point_step': points.itemsize,

@@ -128,7 +128,7 @@ _LETTERS = [
 Image = Callable[[], np.ndarray]
 _RING = {'light': 'stripe', 'ambient': 0.3}
 
-IMAGES: dict[str, tuple[dict[str, str], Image]] = {
+IMAGES: dict[str, tuple[dict[str, Any], Image]] = {
     'ring': ({'family': 'metashape12'}, partial(scene, 'metashape12', 12.0)),
     'ring, stripes': ({'family': 'metashape12'}, partial(scene, 'metashape12', 12.0, **_RING)),
     'traditional': (

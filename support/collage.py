@@ -32,7 +32,8 @@ def collage(radii: Sequence[float], family: str = 'metashape12', **settings: Any
     """
     sides = [_side(radius, family) for radius in radii]
     height, width = sides[0], sides[0] + max(sides[1:], default=0)
-    pieces, truth, seed = [], [], settings.pop('seed', 0)
+    pieces, seed = [], settings.pop('seed', 0)
+    truth: list[TrueTarget] = []
     left, top = 0, 0
     for radius, side in zip(radii, sides, strict=True):
         if top + side > height:  # the next column

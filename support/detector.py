@@ -137,9 +137,9 @@ class DetectorProcess:
 
         self.graph.until(replaced)
 
-    def _subscriptions(self, topic: str) -> set[tuple[int, ...]]:
+    def _subscriptions(self, topic: str) -> frozenset[tuple[int, ...]]:
         known = self.graph.node.get_subscriptions_info_by_topic(f'{self.namespace}/{topic}')
-        return {tuple(it.endpoint_gid) for it in known}
+        return frozenset(tuple(it.endpoint_gid) for it in known)
 
     def get(self, name: str) -> Any:
         """Return the value of a parameter."""

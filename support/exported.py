@@ -42,14 +42,13 @@ def read_mmvii(folder: Path) -> Places:
     for file in folder.glob('MMVII-PhgrProj/ObjMesInstr/ahf/MesIm-*.xml'):
         root = ElementTree.parse(file).getroot()
         assert root.findtext('Type') == '"MMVII_Serialization"'
-        content = root.find('Data/SetMesIm')
-        image = content.findtext('NameIm').strip('"')
+        image = root.findtext('Data/SetMesIm/NameIm', '').strip('"')
         assert file.name == f'MesIm-{image}.xml'
-        for item in content.findall('Measures/el'):
-            xx, _, yy = map(float, item.findtext('Sigma2').split())
+        for item in root.findall('Data/SetMesIm/Measures/el'):
+            xx, _, yy = map(float, item.findtext('Sigma2', '').split())
             assert xx > 0 and yy > 0
-            x, y = map(float, item.findtext('Pt').split())
-            places[image, item.findtext('Name').strip('"')] = x, y
+            x, y = map(float, item.findtext('Pt', '').split())
+            places[image, item.findtext('Name', '').strip('"')] = x, y
     return places
 
 

@@ -35,7 +35,7 @@ def response(shape: tuple[int, int], function: Transfer) -> np.ndarray:
 
 
 def filtered_logarithm_fft(
-    image: np.ndarray, *parameters: float | None, settings: FilterSettings | None = None
+    image: np.ndarray, *parameters: float, settings: FilterSettings | None = None
 ) -> np.ndarray:
     """Return s of Eq. (6), float64; parameters are those of `transfer`."""
     values = logarithm(image, (settings or FilterSettings()).log_offset).astype(np.float64)
@@ -49,7 +49,7 @@ def sampled(values: np.ndarray) -> np.ndarray:
 
 
 def filtered_fft(
-    image: np.ndarray, *parameters: float | None, settings: FilterSettings | None = None
+    image: np.ndarray, *parameters: float, settings: FilterSettings | None = None
 ) -> np.ndarray:
     """Return what `HomomorphicFilter.filtered` approximates, uint8."""
     settings = settings or FilterSettings()

@@ -141,15 +141,15 @@ class Graph:
             rclpy.spin_once(self.node, timeout_sec=0.05)
         return result
 
-    def listen(self, kind: type, topic: str, depth: int = 100) -> list:
+    def listen(self, kind: type, topic: str, depth: int = 100) -> list[Any]:
         """Return a list that messages come into, once there is somebody to send them."""
-        received: list = []
+        received: list[Any] = []
         self.node.create_subscription(kind, topic, received.append, depth)
         for publisher in self.until(lambda: self._publishers(topic)):
             self.introduce(publisher)
         return received
 
-    def newer(self, received: list) -> Any:
+    def newer(self, received: list[Any]) -> Any:
         """Return the last of the messages that a list gets, once one was stamped after now."""
         now = self.node.get_clock().now().to_msg()
 

@@ -127,7 +127,11 @@ def records(of: Network, size: tuple[int, int] = SIZE) -> list[dict[str, Any]]:
         targets = tuple(
             Target(
                 int(of.targets[seen.point[row]]),
-                *(19, *seen.xy[row].tolist(), 4.0, 3.5),
+                19,
+                x=float(seen.xy[row, 0]),
+                y=float(seen.xy[row, 1]),
+                semi_major=4.0,
+                semi_minor=3.5,
                 covariance=tuple(seen.covariance[row].ravel().tolist()),
                 family='cct12',
             )

@@ -42,5 +42,4 @@ class MyDetector:
 
 def my_detector() -> Detector:
     """Return the detector of the example in the documentation."""
-    made: Detector = runpy.run_path(str(EXAMPLE))['MyDetector'](DetectorSettings())
-    return made
+    return runpy.run_path(str(EXAMPLE))['MyDetector'](DetectorSettings())

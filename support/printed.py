@@ -9,7 +9,7 @@ from itertools import islice
 import cv2
 import numpy as np
 
-from ahf_ros import create_detector
+from ahf_ros import DetectorSettings, create_detector
 from ahf_ros.codes.families import KINDS, print_in
 from ahf_ros.evaluation import Score, score, total
 from ahf_ros.printing.drawing import Drawing
@@ -71,7 +71,8 @@ def images(pages: Iterable[Drawing]) -> Iterator[np.ndarray]:
 def identified(settings: SheetSettings) -> Score:
     """Print targets, render the pages and identify what they show."""
     sheets, paper = Sheets(settings), settings.paper
-    detect = create_detector(family=settings.family, polarity=settings.polarity)
+    search = DetectorSettings(family=settings.family, polarity=settings.polarity)
+    detect = create_detector(settings=search)
     targets, scores = list(sheets.targets()), []
     for page, image in enumerate(images(sheets.pages()), 1):
         down, across = image.shape[0] / paper.height, image.shape[1] / paper.width

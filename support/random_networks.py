@@ -27,7 +27,7 @@ class Rendered:
 
     network: Network
     points: FloatArray
-    wrong: FloatArray
+    wrong: np.ndarray
 
 
 def rendered(
@@ -102,10 +102,10 @@ def photographed(
         rows += [(photograph, point, *xy[point]) for point in np.flatnonzero(inside)]
     table = np.array(rows)
     xy = table[:, 2:] + random.normal(0, NOISE, (len(table), 2))
-    photograph, ids = table[:, 0].astype(int), table[:, 1].astype(int)
+    seen_in, ids = table[:, 0].astype(int), table[:, 1].astype(int)
     false = random.random(len(table)) < wrong
     for row in np.flatnonzero(false):
-        free = np.setdiff1d(np.arange(len(points)), ids[photograph == photograph[row]])
+        free = np.setdiff1d(np.arange(len(points)), ids[seen_in == seen_in[row]])
         if len(free):
             ids[row] = random.choice(free)
         else:
@@ -115,9 +115,7 @@ def photographed(
         np.asarray(camera_of),
         cameras,
         tuple(str(index) for index in range(len(points))),
-        Observations(
-            photograph, ids, xy, np.broadcast_to(NOISE**2 * np.eye(2), (len(table), 2, 2))
-        ),
+        Observations(seen_in, ids, xy, np.broadcast_to(NOISE**2 * np.eye(2), (len(table), 2, 2))),
     )
     return Rendered(network, points, false)
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -16,10 +17,11 @@ import cv2
 import numpy as np
 
 from ahf_ros.cli.identify import image_paths
+from ahf_ros.codes import RING_FOLDER
 from ahf_ros.codes.data_file import read_data_file
 from ahf_ros.codes.dots import DOTS_DESIGN, dot_family
 from ahf_ros.codes.gsi import GSI_LIBRARY, point_family
-from ahf_ros.codes.ring import RING_FOLDER, ring_family
+from ahf_ros.codes.ring import ring_family
 from ahf_ros.extras import missing
 from ahf_ros.interchange.arrays import read_arrays
 from ahf_ros.interchange.camera_files import read_camera
@@ -140,14 +142,19 @@ def _shown(path: Path) -> None:
     read_shown([path])
 
 
+def _of_folder(read: Callable[[Path], object], file: Path) -> object:
+    return read(file.parent)
+
+
 def _networks(folder: Path) -> Iterator[Sample]:
     write_network(folder, solution(3, 8))
     archive, network = (
         (folder / it).read_bytes() for it in ('covariance_of_points.npz', 'network.json')
     )
     others = tuple((it.name, it.read_bytes()) for it in folder.iterdir())
-    for read in (read_network, read_coordinates):
-        yield Sample(lambda it, read=read: read(it.parent), 'network.json', network, beside=others)
+    readers: tuple[Callable[[Path], object], ...] = (read_network, read_coordinates)
+    for read in readers:
+        yield Sample(partial(_of_folder, read), 'network.json', network, beside=others)
     yield Sample(
         lambda it: read_network(it.parent), 'covariance_of_points.npz', archive, False, others
     )

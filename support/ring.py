@@ -17,7 +17,9 @@ def made_up(x: Sequence[float], share: float = 1.0, radius: float = 10.0) -> Fit
     """Return dark dots in a row at y = 50, with edges that are usual."""
     count = len(x)
     return Fit(
-        frames=affine_frames(np.array(x), 50.0, radius, radius, 0.0),
+        frames=affine_frames(
+            np.array(x), *(np.full(count, it) for it in (50.0, radius, radius, 0.0))
+        ),
         polarity=np.ones(count, int),
         contrast=np.full(count, 0.3),
         bright=np.full(count, 200.0),
@@ -48,7 +50,8 @@ def measured(
     **options: Any,
 ) -> Fit:
     """Return dots as an image shows them, shape (height, width), from about where they are."""
-    frames = affine_frames(np.array(x), np.array(y), radius, radius, 0.0)
+    radii = np.broadcast_to(radius, len(x))
+    frames = affine_frames(np.array(x), np.array(y), radii, radii, np.zeros(len(x)))
     polarities = np.full(len(frames), polarity)
     return fit_dots(gray.astype(np.float32), frames, polarities, rays=24, reach=REACH, **options)
 

@@ -37,7 +37,7 @@ def errors_of(figures: Score) -> list[float]:
 
 
 @cache
-def rendering(**settings: object) -> Rendering:
+def rendering(**settings: Any) -> Rendering:
     return render(SceneSettings(**settings))
 
 

@@ -116,7 +116,7 @@ class Adjusted:
         if self.bar:
             length = float(np.linalg.norm(start.points[1] - start.points[0]))  # at its epoch
             given = length * (1 + BAR_SIGMA * rng.standard_normal())
-            bar = ScaleBar(self.network.targets[:2], given, BAR_SIGMA * length)
+            bar = ScaleBar(('0', '1'), given, BAR_SIGMA * length)
             network = replace(network, bars=(bar,), unit='m')
         return adjust(network, start, release=_RELEASED, test=False)
 

@@ -33,7 +33,7 @@ def readers() -> dict[str, Reader]:
     except ImportError:
         return found
 
-    class Kept(Detector):
+    class Kept(Detector):  # type: ignore[misc]
         """Never released, as that reads what it has freed (pupil-labs/apriltags, pull 65)."""
 
         def __del__(self) -> None:

@@ -21,8 +21,7 @@ Photograph = dict[str, Any]
 
 def photographs() -> list[Photograph]:
     """Return what all photographs show."""
-    every: list[Photograph] = json.loads((TRUTH / 'photographs.json').read_text())
-    return every
+    return json.loads((TRUTH / 'photographs.json').read_text())
 
 
 def targets_of(shown: Photograph) -> list[TrueTarget]:

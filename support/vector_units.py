@@ -21,7 +21,7 @@ import cv2
 import numpy as np
 
 try:
-    from numpy._core import _multiarray_umath as core
+    from numpy._core import _multiarray_umath as core  # type: ignore[attr-defined]
 except ImportError:  # numpy 1
     from numpy.core import _multiarray_umath as core
 

@@ -9,9 +9,10 @@ from ahf_ros.batch.engine import Engine, finished_tasks, in_order
 from ahf_ros.batch.results import outcome_of
 from ahf_ros.batch.task import ImageOutcome, ImageTask
 from ahf_ros.codes.families import AUTO
+from ahf_ros.detectors.evidence import Reading
 from ahf_ros.session_settings import IdentificationSettings
 from ahf_ros.settings.nested import updated
-from ahf_ros.settling import FIRST, Reading, evident_together
+from ahf_ros.settling import FIRST, evident_together
 from ahf_ros.target import UNDECODED
 
 _LOOK = {'ahf': False, 'expected_targets': 0, 'estimate_expected': False}

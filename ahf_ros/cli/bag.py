@@ -38,7 +38,8 @@ from ahf_ros.settings.parameter import Parameter
 
 if TYPE_CHECKING:
     from ahf_ros.bag.registration import Registered, RegistrationTask
-    from ahf_ros.bag.run import BagTask, Outcome
+    from ahf_ros.bag.run import BagTask
+from ahf_ros.bag.output import Outcome
 
 _Result = list['Outcome | Registered | ValueError']
 """What became of a bag, part by part."""

@@ -62,8 +62,7 @@ def run(arguments: Sequence[str] | None) -> int:
     with inputs_kept():
         options = _parser(arguments).parse_args(arguments)
         try:
-            status: int = _module(options.subcommand).run(options)
-            return status
+            return _module(options.subcommand).run(options)
         except (ValueError, MissingExtra) as error:
             tell(options.subcommand, f'error: {error}')
             return 2

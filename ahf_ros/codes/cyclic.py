@@ -46,8 +46,7 @@ class CyclicFamily(Print):
         """Return the IDs of words wherever their reading begins, 0 where there is none."""
         codes = self.canonical(words)
         index = np.minimum(np.searchsorted(self.words, codes), self.words.size - 1)
-        ids: np.ndarray = np.where(self.words[index] == codes, self.numbers[index], 0)
-        return ids
+        return np.where(self.words[index] == codes, self.numbers[index], 0)
 
     def number(self, word: int) -> int | None:
         """Return the ID of `word` wherever its reading begins; None where there is none."""
@@ -67,8 +66,7 @@ class CyclicFamily(Print):
     def words_of(self, numbers: np.ndarray) -> np.ndarray:
         """Return the canonical code words of IDs, each one of the family."""
         order = np.argsort(self.numbers)
-        found: np.ndarray = self.words[order[np.searchsorted(self.numbers, numbers, sorter=order)]]
-        return found
+        return self.words[order[np.searchsorted(self.numbers, numbers, sorter=order)]]
 
     def orbits(self, numbers: np.ndarray) -> np.ndarray:
         """Return all rotations of the word of each ID, ndarray of uint64, shape (n, k)."""

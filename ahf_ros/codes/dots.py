@@ -82,8 +82,7 @@ class DotFamily(CyclicFamily):
         """
         which = np.flatnonzero(word >> np.arange(self.bits) & 1)
         angles = turn + 2 * pi * which / self.bits
-        places: np.ndarray = self.dot_circle * np.stack([np.cos(angles), np.sin(angles)], axis=1)
-        return places
+        return self.dot_circle * np.stack([np.cos(angles), np.sin(angles)], axis=1)
 
 
 @kept_while_unchanged
@@ -136,7 +135,6 @@ def dot_family(path: str = '') -> DotFamily:
 def smallest_bracelet(words: Any, bits: int) -> np.ndarray:
     """Return the smallest of all rotations and reflections of words, ndarray of int64."""
     words = np.asarray(words, dtype=np.int64)
-    smallest: np.ndarray = np.minimum(
+    return np.minimum(
         smallest_rotation(words, bits), smallest_rotation(mirrored_words(words, bits), bits)
     )
-    return smallest

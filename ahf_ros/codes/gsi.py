@@ -144,8 +144,7 @@ class PointFamily(Print):
     def places(self) -> np.ndarray:
         """Places of the template dots, then of the positions, relative to the centre."""
         every = np.concatenate([self.template, self.positions])
-        centred: np.ndarray = every - self.template[self.reference]
-        return centred
+        return every - self.template[self.reference]
 
     @property
     def radii(self) -> np.ndarray:

@@ -164,5 +164,4 @@ def _confused(design: Print, ids: np.ndarray) -> np.ndarray:
             for covered in (words & ~arc, words | arc):
                 others = index[covered]
                 confused[rows[others >= 0], others[others >= 0]] = True
-    both: np.ndarray = confused | confused.T
-    return both
+    return confused | confused.T

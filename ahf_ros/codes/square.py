@@ -56,8 +56,7 @@ class CellPrint(Print):
         """Return the words of the markers in all four rotations, shape (n, 4)."""
         rotations = dictionary(self.name).bytesList[numbers].transpose(0, 2, 1).astype(np.uint64)
         places = np.uint64(8) * np.arange(rotations.shape[2], dtype=np.uint64)
-        orbits: np.ndarray = (rotations << places).sum(axis=2, dtype=np.uint64)
-        return orbits
+        return (rotations << places).sum(axis=2, dtype=np.uint64)
 
 
 def dictionary(name: str) -> Any:
@@ -121,8 +120,7 @@ def corner_counts(name: str) -> np.ndarray:
     """Return how many corners what is white on the markers of a dictionary has, (k,), by ID."""
     cells = np.pad(words(name), ((0, 0), (1, 1), (1, 1)))
     corners = cells[:, :-1, :-1] ^ cells[:, :-1, 1:] ^ cells[:, 1:, :-1] ^ cells[:, 1:, 1:]
-    counts: np.ndarray = corners.sum(axis=(1, 2))
-    return counts
+    return corners.sum(axis=(1, 2))
 
 
 @lru_cache(maxsize=64)

@@ -146,8 +146,7 @@ def create_detector(
     families = [it.name for it in _families(name, settings)]
     if len(families) < len(settings.families):
         settings = settings.narrowed(families)
-    made: Detector = resolve_name(f'ahf_ros.{_ENTRIES[name].detector}')(settings)
-    return made
+    return resolve_name(f'ahf_ros.{_ENTRIES[name].detector}')(settings)
 
 
 def detector_name(name: str, settings: DetectorSettings) -> str:

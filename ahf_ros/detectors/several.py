@@ -187,8 +187,7 @@ def _beside(dots: np.ndarray, targets: Sequence[Target], prints: Prints) -> np.n
     """Return the frames of dots, shape (k, 3, 3), whose centres are on none of some targets."""
     x, y, reach = np.array([(it.x, it.y, _radius(it, prints)) for it in targets]).T
     away = np.hypot(dots[:, :1, 2] - x, dots[:, 1, 2, None] - y)
-    beside: np.ndarray = dots[(away >= reach).all(axis=1)]
-    return beside
+    return dots[(away >= reach).all(axis=1)]
 
 
 def _radius(target: Target, prints: Prints) -> float:

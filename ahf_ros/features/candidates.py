@@ -353,8 +353,7 @@ def _clear_sparse_blocks(votes: np.ndarray, cells: np.ndarray, wide: int, needed
 def _of_four(joined: np.ufunc, values: np.ndarray) -> np.ndarray:
     """Return what joins two by two neighbours in arrays of values, (k, m, n), (k, m-1, n-1)."""
     rows = joined(values[:, 1:], values[:, :-1])
-    of_four: np.ndarray = joined(rows[:, :, 1:], rows[:, :, :-1])
-    return of_four
+    return joined(rows[:, :, 1:], rows[:, :, :-1])
 
 
 def _weighted(votes: np.ndarray, cells: np.ndarray, wide: int) -> np.ndarray:

@@ -86,8 +86,7 @@ class Fit(ArrayRecord):
     @property
     def clearness(self) -> np.ndarray:
         """How whole outlines are, and how dark ink is, from 0 to 1, shape (k,)."""
-        clearness: np.ndarray = self.share * (1 - self.contrast)
-        return clearness
+        return self.share * (1 - self.contrast)
 
     def clearest(self, most: int | None = None) -> np.ndarray:
         """Return the indices of the clearest targets, these first, so many at the most."""

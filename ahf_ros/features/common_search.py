@@ -74,5 +74,4 @@ def _within(dots: Dots, outlines: Sequence[np.ndarray] | np.ndarray) -> np.ndarr
     points = np.maximum(points, 0)
     width, height = points.reshape(-1, 2).max(axis=0, initial=0) + 1
     inside = mask_of(outlines, (height, width))[points[..., 1], points[..., 0]]
-    within: np.ndarray = inside.mean(axis=1) > _EXPLAINED
-    return within
+    return inside.mean(axis=1) > _EXPLAINED

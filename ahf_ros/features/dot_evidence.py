@@ -64,12 +64,10 @@ def dot_evidence(
     none = np.exp(-0.5 * (steps / empty) ** 2) / (np.sqrt(2 * np.pi) * empty)
     floor = _FLOOR / _RANGE
     ratio = np.log(((1 - _FLOOR) * dot + floor) / ((1 - _FLOOR) * none + floor))
-    evidence: np.ndarray = independent_rays(frames) * ratio.sum(axis=-1)
-    return evidence
+    return independent_rays(frames) * ratio.sum(axis=-1)
 
 
 def independent_rays(frames: np.ndarray) -> np.ndarray:
     """Return the share of rays round dots with frames (..., 3, 3) that count as independent."""
     length = 2 * np.pi * np.sqrt(np.abs(np.linalg.det(frames[..., :2, :2])))
-    share: np.ndarray = np.clip(length / _CORRELATION, 4, _RAYS) / _RAYS
-    return share
+    return np.clip(length / _CORRELATION, 4, _RAYS) / _RAYS

@@ -157,8 +157,7 @@ def mean_radii(frames: np.ndarray) -> np.ndarray:
 
 def local_affine(frames: np.ndarray) -> np.ndarray:
     """Return the derivatives of frames' maps at the centre, shape (..., 2, 2), px a radius."""
-    affine: np.ndarray = frames[..., :2, :2] - frames[..., :2, 2:] * frames[..., 2:, :2]
-    return affine
+    return frames[..., :2, :2] - frames[..., :2, 2:] * frames[..., 2:, :2]
 
 
 def nearest(frames: np.ndarray, others: np.ndarray, count: int) -> np.ndarray:

@@ -24,8 +24,7 @@ def logistic(features: np.ndarray, weights: np.ndarray) -> np.ndarray:
     array([0.5])
     """
     odds = np.clip(weights[0] + features @ weights[1:], -_MAXIMUM_ODDS, _MAXIMUM_ODDS)
-    probabilities: np.ndarray = 1 / (1 + np.exp(-odds))
-    return probabilities
+    return 1 / (1 + np.exp(-odds))
 
 
 def read_weights(path: Path, purpose: str, *names: str) -> tuple[np.ndarray, ...]:

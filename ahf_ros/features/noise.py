@@ -39,7 +39,4 @@ def reading_noise(gray: np.ndarray, frames: np.ndarray, radius: float) -> np.nda
     differences = np.zeros(first.shape, np.float32)
     for (down, across), factor in np.ndenumerate(_DIFFERENCE):
         differences += factor * values.take(first + (down * width + across))
-    noise: np.ndarray = medians(np.abs(differences)) * (
-        NORMAL * _INTERPOLATED / np.linalg.norm(_DIFFERENCE)
-    )
-    return noise
+    return medians(np.abs(differences)) * (NORMAL * _INTERPOLATED / np.linalg.norm(_DIFFERENCE))

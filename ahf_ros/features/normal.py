@@ -27,8 +27,7 @@ def normal_integral(values: np.ndarray) -> np.ndarray:
     >>> normal_integral(np.array([-1.0, 0.0, 6.0])).round(3)
     array([0.159, 0.5  , 1.   ])
     """
-    share: np.ndarray = 0.5 * (1 + np.tanh(_SCALE * values * (1 + _CUBIC * values * values)))
-    return share
+    return 0.5 * (1 + np.tanh(_SCALE * values * (1 + _CUBIC * values * values)))
 
 
 def exact_normal_integral(values: np.ndarray) -> np.ndarray:

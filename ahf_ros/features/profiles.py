@@ -163,8 +163,7 @@ def _best_offsets(found: np.ndarray) -> np.ndarray:
     second *= second
     first += second
     np.copyto(first, -1.0, where=contrast <= 0)
-    best: np.ndarray = first.argmax(axis=1)
-    return best
+    return first.argmax(axis=1)
 
 
 @cache

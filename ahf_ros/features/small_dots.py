@@ -124,8 +124,7 @@ def _blobs(height: np.ndarray, min_radius: float, max_radius: float, polarity: i
     longest = 1 + np.maximum(width, y[start + size - 1] - y[start])  # rows ascend in a blob
 
     def mean(values: np.ndarray) -> np.ndarray:
-        means: np.ndarray = np.add.reduceat(values, start) / size
-        return means
+        return np.add.reduceat(values, start) / size
 
     centre_x, centre_y = mean(x), mean(y)
     x, y = x - np.repeat(centre_x, size), y - np.repeat(centre_y, size)

@@ -26,8 +26,7 @@ def black_lift(contrast: np.ndarray, bright: np.ndarray) -> np.ndarray:
     """
     wanted = _PRINTED * (1 - contrast)
     missing = np.maximum(wanted - contrast, 0) * bright
-    lift: np.ndarray = missing / (1 - wanted + missing / 255)
-    return lift
+    return missing / (1 - wanted + missing / 255)
 
 
 def lifted(values: np.ndarray, lift: np.ndarray) -> np.ndarray:
@@ -35,5 +34,4 @@ def lifted(values: np.ndarray, lift: np.ndarray) -> np.ndarray:
 
     `lift` is broadcast to the shape of `values`, see `black_lift`.
     """
-    moved: np.ndarray = lift + (1 - lift / 255) * values
-    return moved
+    return lift + (1 - lift / 255) * values

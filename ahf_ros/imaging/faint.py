@@ -126,8 +126,7 @@ def _many_higher(sizes: np.ndarray, heights: np.ndarray) -> np.ndarray:
     """Return the tiles of a row that have `_STEPS` steps of more than a height each."""
     higher = sizes > np.repeat(heights.astype(np.float32), _HALF)
     columns = np.add.reduce(higher, axis=0, dtype=np.uint8)
-    enough: np.ndarray = columns.reshape(len(heights), _HALF).sum(axis=1) >= _STEPS
-    return enough
+    return columns.reshape(len(heights), _HALF).sum(axis=1) >= _STEPS
 
 
 def _noise(tiles: np.ndarray) -> np.ndarray:

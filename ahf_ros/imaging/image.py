@@ -116,8 +116,7 @@ def as_gray(image: np.ndarray) -> np.ndarray:
 
 def as_light(gray: np.ndarray) -> np.ndarray:
     """Return the light that gray values show, float32, from 0 to 255 as these."""
-    light: np.ndarray = 255 * cv2.pow(np.maximum(gray, 0) / np.float32(255), GAMMA)
-    return light
+    return 255 * cv2.pow(np.maximum(gray, 0) / np.float32(255), GAMMA)
 
 
 def stretched_to_8_bit(image: np.ndarray) -> np.ndarray:

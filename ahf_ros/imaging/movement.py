@@ -289,8 +289,7 @@ def _profiles(
     if not len(x):
         return columns
     across, down = (remapped(of, columns, rows, cv2.BORDER_CONSTANT) for of in gradients)
-    along: np.ndarray = across * normals[:, :1] + down * normals[:, 1:]
-    return along
+    return across * normals[:, :1] + down * normals[:, 1:]
 
 
 def _vertex(

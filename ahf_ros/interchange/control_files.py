@@ -102,5 +102,4 @@ def _covariance(row: Row, group: int, sigma: float) -> FloatArray:
     elif group == 1:
         covariance[np.triu_indices(3)] = [row.number(name) for name in _ENTRIES]
     upper = np.triu(covariance, 1)
-    complete: FloatArray = np.diag(np.diag(covariance)) + upper + upper.T
-    return complete
+    return np.diag(np.diag(covariance)) + upper + upper.T

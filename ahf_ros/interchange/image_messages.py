@@ -138,8 +138,7 @@ def _samples(message: Any, encoding: Encoding) -> np.ndarray:
         message.data,
         strides=(message.step, encoding.size, kind.itemsize),
     )
-    aligned: np.ndarray = np.require(samples.astype(kind, copy=False), requirements='A')
-    return aligned
+    return np.require(samples.astype(kind, copy=False), requirements='A')
 
 
 def _gray(samples: np.ndarray, encoding: Encoding) -> np.ndarray:

@@ -294,8 +294,7 @@ class _Record:
         return value
 
     def text(self, name: str) -> str:
-        text: str = self.value(name, str)
-        return text
+        return self.value(name, str)
 
     def number(self, name: str) -> float:
         value = self.value(name, object)

@@ -145,8 +145,7 @@ class Input:
 
     def publishers(self) -> list[TopicEndpointInfo]:
         """Return who publishes on the topic, of whatever type."""
-        found: list[TopicEndpointInfo] = self._node.get_publishers_info_by_topic(self.name)
-        return found
+        return self._node.get_publishers_info_by_topic(self.name)
 
     def follow(self) -> None:
         """Subscribe anew if the publishers now offer another quality of service."""

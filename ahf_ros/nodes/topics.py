@@ -27,8 +27,7 @@ IMAGE = 'image'
 def image_type(transport: str) -> type:
     """Return the type of the images of one of `IMAGE_TRANSPORTS`."""
     if transport == FFMPEG:
-        packet: type = import_module(f'{PACKAGES[FFMPEG]}.msg').FFMPEGPacket
-        return packet
+        return import_module(f'{PACKAGES[FFMPEG]}.msg').FFMPEGPacket
     return Image if transport == RAW else CompressedImage
 
 

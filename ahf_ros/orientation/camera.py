@@ -272,8 +272,7 @@ def _undistorted_fisheye(calibration: FloatArray, distorted: FloatArray) -> Floa
 def _slope(calibration: FloatArray, angle: FloatArray) -> FloatArray:
     """Return the derivatives (n,) of distances in the image of a fisheye lens by angles (n,)."""
     odd = np.arange(1, 10, 2)
-    slopes: FloatArray = (odd * angle[:, None] ** (odd - 1) * _polynomial(calibration)).sum(-1)
-    return slopes
+    return (odd * angle[:, None] ** (odd - 1) * _polynomial(calibration)).sum(-1)
 
 
 def _angles(place: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -284,8 +283,7 @@ def _angles(place: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
 
 def _powers(angle: FloatArray) -> FloatArray:
     """Return t, t³, t⁵, t⁷ and t⁹ (n, 5) of angles (n,)."""
-    powers: FloatArray = angle[:, None] ** np.arange(1, 10, 2)
-    return powers
+    return angle[:, None] ** np.arange(1, 10, 2)
 
 
 def _polynomial(calibration: FloatArray) -> FloatArray:

@@ -135,8 +135,7 @@ def _turns(stations: Sequence[Station]) -> FloatArray:
 def nearest_rotation(matrix: FloatArray) -> FloatArray:
     """Return the rotation (3, 3) nearest to a matrix in the sum of squared differences."""
     left, _, right = np.linalg.svd(matrix)
-    rotation: FloatArray = (left * [1, 1, np.linalg.det(left @ right)]) @ right
-    return rotation
+    return (left * [1, 1, np.linalg.det(left @ right)]) @ right
 
 
 class _Model:

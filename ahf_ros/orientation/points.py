@@ -17,14 +17,12 @@ def blocks(covariance: FloatArray) -> FloatArray:
     """Return the covariance (n, 3, 3) of each point from that of all, (3n, 3n)."""
     count = len(covariance) // 3
     each = np.arange(count)
-    own: FloatArray = covariance.reshape(count, 3, count, 3)[each, :, each]
-    return own
+    return covariance.reshape(count, 3, count, 3)[each, :, each]
 
 
 def standard_deviations(covariance: FloatArray) -> FloatArray:
     """Return the square roots of the diagonal, where rounding may leave less than zero."""
-    deviations: FloatArray = np.sqrt(np.maximum(np.diag(covariance), 0))
-    return deviations
+    return np.sqrt(np.maximum(np.diag(covariance), 0))
 
 
 def correlations(covariance: FloatArray) -> FloatArray:

@@ -56,8 +56,7 @@ class Sight:
     @property
     def sigma(self) -> FloatArray:
         """Standard deviations (n,) of a coordinate of the places, the mean of both."""
-        sigma: FloatArray = np.sqrt(np.trace(self.covariances, axis1=1, axis2=2) / 2)
-        return sigma
+        return np.sqrt(np.trace(self.covariances, axis1=1, axis2=2) / 2)
 
     def chosen(self, rows: IntArray) -> Sight:
         """Return some of the points."""
@@ -334,14 +333,12 @@ def nearest(sight: Sight, fit: Fit, place: int, points: FloatArray) -> tuple[int
 
 
 def _depths(points: FloatArray, rotation: FloatArray, position: FloatArray) -> FloatArray:
-    depths: FloatArray = (points - position) @ rotation[2]
-    return depths
+    return (points - position) @ rotation[2]
 
 
 def _seen(points: FloatArray, rotation: FloatArray, position: FloatArray) -> FloatArray:
     """Return points (n, 3) in the frame of the camera."""
-    seen: FloatArray = (points - position) @ rotation.T
-    return seen
+    return (points - position) @ rotation.T
 
 
 def _misclosure(part: Sight, seen: FloatArray) -> FloatArray:
@@ -384,18 +381,14 @@ def _covariance(part: Sight, rotation: FloatArray, position: FloatArray) -> Floa
 
 def _whitening(part: Sight, rotation: FloatArray, position: FloatArray) -> FloatArray:
     """Return the matrix (2n, 2n) that makes errors of unit weight of those of the places."""
-    whitening: FloatArray = np.linalg.inv(
-        np.linalg.cholesky(_covariance(part, rotation, position))
-    )
-    return whitening
+    return np.linalg.inv(np.linalg.cholesky(_covariance(part, rotation, position)))
 
 
 def _own_blocks(matrix: FloatArray) -> FloatArray:
     """Return the blocks (n, 2, 2) on the diagonal of a matrix (2n, 2n)."""
     count = len(matrix) // 2
     each = np.arange(count)
-    blocks: FloatArray = matrix.reshape(count, 2, count, 2)[each, :, each]
-    return blocks
+    return matrix.reshape(count, 2, count, 2)[each, :, each]
 
 
 def _mahalanobis(vectors: FloatArray, covariances: FloatArray) -> FloatArray:
@@ -407,5 +400,4 @@ def _mahalanobis(vectors: FloatArray, covariances: FloatArray) -> FloatArray:
     along = (axes.transpose(0, 2, 1) @ vectors[:, :, None])[:, :, 0]
     known = sizes > 1e-9 * sizes[:, 1:]
     squares = np.where(known, along**2 / np.where(known, sizes, 1), 0)
-    lengths: FloatArray = np.sqrt(squares.sum(axis=1))
-    return lengths
+    return np.sqrt(squares.sum(axis=1))

@@ -30,8 +30,7 @@ class Similarity:
         count = len(covariance) // 3
         blocks = covariance.reshape(count, 3, count, 3)
         turned = np.einsum('ai,minj,bj->manb', self.rotation, blocks, self.rotation, optimize=True)
-        result: FloatArray = self.scale**2 * turned.reshape(covariance.shape)
-        return result
+        return self.scale**2 * turned.reshape(covariance.shape)
 
     def in_frame(self, start: Start) -> Start:
         """Return the values of a network after the movement."""

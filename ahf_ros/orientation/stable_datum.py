@@ -214,8 +214,7 @@ def _pseudoinverse(covariance: FloatArray, free: FloatArray) -> FloatArray:
             'covariance of the common targets is singular beyond the datum, accepted is one of '
             'coordinates that were all measured'
         )
-    inverse: FloatArray = ((vectors / values) @ vectors.T - added) / size
-    return inverse
+    return ((vectors / values) @ vectors.T - added) / size
 
 
 def f_probability(above: ArrayLike, below: ArrayLike, statistic: ArrayLike) -> FloatArray:

@@ -89,8 +89,7 @@ class _Tested:
 
     def expected(self, values: FloatArray) -> FloatArray:
         """Return the mean (g,) of values (s, g), as the groups but the tested one expect it."""
-        mean: FloatArray = (self.by_others * values).sum(axis=0)
-        return mean
+        return (self.by_others * values).sum(axis=0)
 
     @property
     def chances(self) -> FloatArray:
@@ -124,15 +123,13 @@ class _Tested:
 def _likelihood(misfits: FloatArray) -> FloatArray:
     """Return twice the log of the mean likelihood over the rows of misfits (s, g)."""
     best = misfits.min(axis=0)
-    likelihood: FloatArray = 2 * np.log(np.exp((best - misfits) / 2).sum(axis=0)) - best
-    return likelihood
+    return 2 * np.log(np.exp((best - misfits) / 2).sum(axis=0)) - best
 
 
 def _shares(misfits: FloatArray) -> FloatArray:
     """Return the share of each row of misfits (s, ...) in the likelihood of all."""
     likelihood = np.exp((misfits.min(axis=0) - misfits) / 2)
-    shares: FloatArray = likelihood / likelihood.sum(axis=0)
-    return shares
+    return likelihood / likelihood.sum(axis=0)
 
 
 @dataclass(frozen=True)

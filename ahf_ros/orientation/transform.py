@@ -64,13 +64,11 @@ class Transform:
 
     def moved(self, points: FloatArray) -> FloatArray:
         """Return points (..., 3) after the transform."""
-        result: FloatArray = points @ self.rotation.T + self.translation
-        return result
+        return points @ self.rotation.T + self.translation
 
     def turned(self, covariances: FloatArray) -> FloatArray:
         """Return covariances (n, 3, 3) of points after the transform, which is without error."""
-        result: FloatArray = self.rotation @ covariances @ self.rotation.T
-        return result
+        return self.rotation @ covariances @ self.rotation.T
 
     def changes(self, points: FloatArray) -> FloatArray:
         """Return how `moved` of points (n, 3) changes with errors of the transform, (n, 3, 6)."""
@@ -127,8 +125,7 @@ def twice(rotation: FloatArray) -> FloatArray:
 def turned_errors(rotation: FloatArray, covariance: FloatArray) -> FloatArray:
     """Return a covariance (6, 6) of shift and turn along the axes of another frame."""
     turn = twice(rotation)
-    result: FloatArray = turn @ covariance @ turn.T
-    return result
+    return turn @ covariance @ turn.T
 
 
 def rotation_vector(quaternion: FloatArray) -> FloatArray:
@@ -136,5 +133,4 @@ def rotation_vector(quaternion: FloatArray) -> FloatArray:
     sine = float(np.linalg.norm(quaternion[:3]))
     if not sine:
         return np.zeros(3)
-    result: FloatArray = 2 * np.arctan2(sine, quaternion[3]) / sine * quaternion[:3]
-    return result
+    return 2 * np.arctan2(sine, quaternion[3]) / sine * quaternion[:3]

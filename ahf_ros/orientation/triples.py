@@ -54,8 +54,7 @@ BOUND = 4.0
 
 def focal_steps(view: CameraView) -> FloatArray:
     """Return focal lengths in px that are tried of a camera of which nothing is known."""
-    steps: FloatArray = STEPS * max(view.width, view.height) * (FISHEYE if view.equidistant else 1)
-    return steps
+    return STEPS * max(view.width, view.height) * (FISHEYE if view.equidistant else 1)
 
 
 @dataclass(frozen=True)

@@ -66,7 +66,7 @@ def geometry_text(sheets: Sheets) -> str:
     return json.dumps(geometry, indent=1) + '\n'
 
 
-def _rounded(values: dict) -> dict:
+def _rounded(values: dict[str, float]) -> dict[str, float]:
     return {name: round(value, _DIGITS) for name, value in values.items()}
 
 

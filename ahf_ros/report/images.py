@@ -14,7 +14,8 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from ahf_ros.filtering.homomorphic import FilterSettings, HomomorphicFilter
+from ahf_ros.filtering.homomorphic import HomomorphicFilter
+from ahf_ros.filtering.settings import FilterSettings
 from ahf_ros.imaging.image import stretched_to_8_bit
 from ahf_ros.imaging.stack import ImageStack, unlike
 from ahf_ros.interchange.image_files import find_image, read_image

@@ -40,8 +40,7 @@ def network_page(solution: Solution, title: str) -> bytes:
         script=page_script(_PAGE, ('network',)),
         **_content(solution),
     )
-    encoded: bytes = text.encode('utf-8', 'backslashreplace')
-    return encoded
+    return text.encode('utf-8', 'backslashreplace')
 
 
 def _content(solution: Solution) -> dict[str, Any]:

@@ -63,5 +63,4 @@ def scene(solution: Solution) -> dict[str, Any]:
 def _short(values: FloatArray, extent: float) -> list[list[float]]:
     """Return numbers without the digits that nobody sees."""
     digits = max(_DIGITS - 1 - int(np.floor(np.log10(extent))), _DIRECTION)
-    rounded: list[list[float]] = np.round(values, digits).tolist()
-    return rounded
+    return np.round(values, digits).tolist()

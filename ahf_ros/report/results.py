@@ -8,7 +8,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from ahf_ros.interchange.target_json import RESULTS_FILE, targets_from_json
+from ahf_ros.interchange.files import RESULTS_FILE
+from ahf_ros.interchange.target_json import targets_from_json
 from ahf_ros.opening import LARGEST, Most, file_errors, parsed_json, parsing, read_text
 from ahf_ros.target import UNDECODED, FilterState, SearchTrace, Target
 from ahf_ros.target_check import MAXIMUM_ID, checked_integer, checked_number

@@ -101,8 +101,7 @@ class Camera:
     def vignetting(self, pixels: np.ndarray) -> np.ndarray:
         """Return the vignetting of pixels, shape (n, 2): cos^4 of the field angle."""
         seen = (pixels - self.intrinsics[:2, 2]) / self.intrinsics[0, 0]
-        share: np.ndarray = (1 + (seen**2).sum(axis=1)) ** -2
-        return share
+        return (1 + (seen**2).sum(axis=1)) ** -2
 
     def circle(self, centre: np.ndarray, radius: float) -> tuple[float, float, float]:
         """Return the semi-axes, px, and the angle of the image of a circle on the wall.

@@ -114,8 +114,7 @@ def _sector_cover(
     shades = colours.astype(np.float32)
     beyond = (position - edge) * np.float32(2 * math.pi / bits)
     share = _inside_share(beyond + growth * (shades[after] - shades[after - 1]), width)
-    cover: np.ndarray = shades[after] * share + shades[after - 1] * (1 - share)
-    return cover
+    return shades[after] * share + shades[after - 1] * (1 - share)
 
 
 def _cells_cover(cells: Cells, turn: float, growth: float) -> Cover:

@@ -40,8 +40,7 @@ class Projector:
         squared = (towards**2).sum(axis=-1) + self.position[2] ** 2
         reach = self.position @ self.position
         field = (self.position[2] ** 2 - towards @ self.position[:2]) / np.sqrt(squared * reach)
-        light: np.ndarray = (reach / squared) ** 1.5 * np.clip(field, 0, 1) ** 4
-        return light
+        return (reach / squared) ** 1.5 * np.clip(field, 0, 1) ** 4
 
 
 def rig_projector(

@@ -232,8 +232,7 @@ def drawn_numbers(settings: Any, generator: np.random.Generator) -> list[int]:
     every = design.numbers if isinstance(design, PointFamily) else design.all_ids
     rounds = -(-count // len(every))
     shuffled = [generator.permutation(every) for _ in range(rounds)]
-    numbers: list[int] = np.concatenate([np.empty(0, int), *shuffled])[:count].tolist()
-    return numbers
+    return np.concatenate([np.empty(0, int), *shuffled])[:count].tolist()
 
 
 def _half_view(width: int, height: int, focal_length: float) -> float:

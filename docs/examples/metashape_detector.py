@@ -13,7 +13,7 @@ import sys
 import Metashape
 
 
-def main(path):
+def main(path: str) -> None:
     """Print the 12-bit targets of one image."""
     chunk = Metashape.Document().addChunk()
     chunk.addPhotos([path])

@@ -13,6 +13,7 @@ import sys
 from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from rosbags.highlevel import AnyReader
 
@@ -30,7 +31,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     with AnyReader(bags) as reader:
         answers = [it for it in reader.connections if it.msgtype == ANSWERS]
         for connection, _, data in reader.messages(answers):
-            answer = reader.deserialize(data, connection.msgtype)
+            answer: Any = reader.deserialize(data, connection.msgtype)
             if getattr(answer, 'status', 0):  # not identified; older bags do not say so
                 print(f'{connection.topic}: {answer.reason}', file=sys.stderr)
                 continue

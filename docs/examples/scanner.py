@@ -137,7 +137,7 @@ def scan(number: int) -> Scan:
         cloud[inside] = (rays * depth[:, :, None])[inside]
     image = cv2.resize(finer, SIZE, interpolation=cv2.INTER_AREA)
     image = cv2.GaussianBlur(image.astype(np.float32), (0, 0), 0.6)
-    image += random.standard_normal(image.shape)
+    image += random.standard_normal(image.shape)  # type: ignore[arg-type]
     return Scan(np.clip(np.rint(image), 0, 255).astype(np.uint8), cloud, rotation, position)
 
 

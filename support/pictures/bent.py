@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from ahf_ros.synthetic.bent.settings import BentSettings
@@ -40,7 +42,7 @@ def settings(
 ) -> BentSettings:
     """Return the picture of a polarity, a light of `LIGHTS`, a radius in px and a seed."""
     generator = np.random.default_rng(seed)
-    drawn = {name: float(generator.uniform(*of)) for name, of in _RANGES.items()}
+    drawn: dict[str, Any] = {name: float(generator.uniform(*of)) for name, of in _RANGES.items()}
     pattern, ambient = light.split()
     share = DOT_SHARES.get(family, 1.0)
     return BentSettings(

@@ -55,9 +55,9 @@ def exposures() -> dict[str, Exposure]:
     for count in (3, 6):
         lines = occluders.scratches(count, dirt)
         rows[f'{count} scratches 1 to 3 px wide'] = Exposure(occluder=lines)
-    for radius, levels in ((1.0, 200.0), (1.0, 400.0), (1.5, 200.0)):
-        glare = occluders.highlight(radius, levels)
-        rows[f'highlight of {radius} dot radii, +{levels:.0f}'] = Exposure(glare=glare)
+    for radius, added in ((1.0, 200.0), (1.0, 400.0), (1.5, 200.0)):
+        glare = occluders.highlight(radius, added)
+        rows[f'highlight of {radius} dot radii, +{added:.0f}'] = Exposure(glare=glare)
     for contrast, noise in ((20, 1.5), (15, 1.0), (10, 0.7), (5, 0.5)):
         levels = (130.0, 130.0 - contrast, noise)
         rows[f'{contrast} gray levels, noise {noise}'] = Exposure(levels=levels)
@@ -93,8 +93,8 @@ def noisy(noise: float, image: np.ndarray, generator: np.random.Generator) -> np
 
 def compressed(quality: int, image: np.ndarray, _: np.random.Generator) -> np.ndarray:
     """Return an image after JPEG compression."""
-    _, code = cv2.imencode('.jpg', image, [cv2.IMWRITE_JPEG_QUALITY, quality])
-    return cv2.imdecode(code, cv2.IMREAD_GRAYSCALE)
+    code = cv2.imencode('.jpg', image, [cv2.IMWRITE_JPEG_QUALITY, quality])[1]
+    return np.asarray(cv2.imdecode(code, cv2.IMREAD_GRAYSCALE))
 
 
 def overlapping(

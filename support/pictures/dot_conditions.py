@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from itertools import product
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -58,7 +59,7 @@ def gsi_scenes(seed: int, folder: Path) -> Iterator[tuple[str, SceneSettings]]:
     for light, ambient in product(LIGHT_NAMES[1:], (0.3, 0.12, 0.04)):
         radius = float(generator.choice([5.0, 6.0, 8.0, 10.0]))
         polarity = str(generator.choice(['dark', 'bright']))
-        changes = {'dot_radius': radius, 'polarity': polarity}
+        changes: dict[str, Any] = {'dot_radius': radius, 'polarity': polarity}
         yield light, printed(replace(GSI, light=light, ambient=ambient, **changes))
     for tilt, radius in product((0.0, 45.0, 70.0, 80.0), (2.5, 4.0, 5.0)):
         polarity = str(generator.choice(['dark', 'bright']))
@@ -78,7 +79,8 @@ def with_covered_dots(scene: Rendering, count: int) -> tuple[np.ndarray, set[int
     count : int
         Number of these targets, of those that are identified.
     """
-    image, covered = scene.image.copy(), set()
+    image = scene.image.copy()
+    covered: set[int] = set()
     shown = {target.id for target in scene.targets}
     for target in create_detector(family='gsi')(image):
         if target.id in shown and len(covered) < count and isinstance(target, DottedTarget):

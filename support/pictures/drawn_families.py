@@ -12,7 +12,12 @@ from ahf_ros.codes.cyclic import smallest_rotation
 from ahf_ros.codes.ring import conforming, ring_family
 from ahf_ros.synthetic.scene import Rendering, SceneSettings, render
 
-RULES = ({}, {'parity': 'even'}, {'parity': 'even', 'opposite_pairs': 1}, {'changes': 6})
+RULES: tuple[dict[str, Any], ...] = (
+    {},
+    {'parity': 'even'},
+    {'parity': 'even', 'opposite_pairs': 1},
+    {'changes': 6},
+)
 """Rules of words, one of which is drawn."""
 
 LIGHTS = ('normal', 'stripe', 'lattice')
@@ -22,7 +27,7 @@ TARGETS = 20
 """In an image that is identified."""
 
 
-def random_family(file: Path, generator: np.random.Generator) -> dict[str, object]:
+def random_family(file: Path, generator: np.random.Generator) -> dict[str, Any]:
     """Write the data file of a family, and return its rule."""
     rule = dict(RULES[generator.integers(len(RULES))])
     bits = int(generator.integers(6, 25))

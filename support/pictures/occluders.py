@@ -105,8 +105,7 @@ def _speck(cell: Cell, generator: np.random.Generator) -> np.ndarray:
     reach = _DIRTY * math.sqrt(generator.uniform())
     x = cell.x - np.float32(reach * math.cos(direction))
     y = cell.y - np.float32(reach * math.sin(direction))
-    distance: np.ndarray = np.sqrt(x * x + y * y)
-    return distance
+    return np.sqrt(x * x + y * y)
 
 
 def _scratch(cell: Cell, generator: np.random.Generator) -> np.ndarray:
@@ -177,8 +176,7 @@ def _from_band(cell: Cell, generator: np.random.Generator) -> np.ndarray:
 def _beside(cell: Cell, direction: float) -> np.ndarray:
     """Return the distances of the samples from a line through the centre, positive to its left."""
     cosine, sine = np.float32(math.cos(direction)), np.float32(math.sin(direction))
-    beside: np.ndarray = cell.y * cosine - cell.x * sine
-    return beside
+    return cell.y * cosine - cell.x * sine
 
 
 def _share(inside: np.ndarray, cell: Cell) -> np.ndarray:

@@ -14,6 +14,7 @@ from typing import Any
 import cv2
 import numpy as np
 
+from ahf_ros.codes.prints import Cells
 from ahf_ros.codes.ring import FAMILY_NAMES, family
 from ahf_ros.codes.square import CellPrint, dictionary
 from ahf_ros.synthetic.covers import Cover, ink_cover
@@ -146,7 +147,8 @@ class Sheet:
         """Return the reflectance of a cell and the gray values of the glare on it."""
         ink = mark.ink.astype(np.float32) / np.float32(255)
         share = INK + (1 - INK) * ink if self.bright else 1 - (1 - INK) * ink
-        glare = np.zeros((self.side, self.side), np.float32)
+        size = (self.side, self.side)
+        glare: np.ndarray = np.zeros(size, np.float32)
         if exposure.occluder or exposure.glare:
             cell = self._samples(mark, corner)
             if exposure.occluder:
@@ -154,8 +156,7 @@ class Sheet:
                 share += covered * (np.asarray((gray / WHITE) ** GAMMA, np.float32) - share)
             if exposure.glare:
                 added = exposure.glare(cell, generator)
-                glare = cv2.resize(added, glare.shape, interpolation=cv2.INTER_AREA)
-        size = (self.side, self.side)
+                glare = cv2.resize(added, size, interpolation=cv2.INTER_AREA)
         return cv2.resize(share, size, interpolation=cv2.INTER_AREA), glare
 
     def _samples(self, mark: Mark, corner: tuple[int, int]) -> Cell:
@@ -194,6 +195,7 @@ def target_sheet(
             code = family(name)
             return lambda turn: ink_cover(code.ink(code.word(number), _PINHOLE), turn)
         (cells,) = CellPrint(name).ink(number)
+        assert isinstance(cells, Cells)
         return lambda turn: ink_cover([replace(cells, half_side=_SQUARE)], turn)
 
     every = map(int, numbers)

@@ -65,7 +65,7 @@ def _photograph(texture: np.ndarray, generator: np.random.Generator) -> np.ndarr
 def _seen(texture: np.ndarray, generator: np.random.Generator) -> np.ndarray:
     """Return a texture in a random perspective."""
     width, height = SIZE
-    corners = np.float32([(0, 0), (width, 0), (width, height), (0, height)])
+    corners = np.array([(0, 0), (width, 0), (width, height), (0, height)], np.float32)
     moved = corners + generator.uniform(-90, 90, (4, 2)).astype(np.float32)
     view = cv2.getPerspectiveTransform(corners, moved)
     return cv2.warpPerspective(texture, view, SIZE, borderMode=cv2.BORDER_REFLECT)

@@ -153,8 +153,7 @@ class CctagDetector(FamilyDetector):
     def _shown(self, rings: Aligned) -> np.ndarray:
         """Return which readings are sure enough to be reported, (k,)."""
         undecoded = self.settings.report_undecoded & (rings.of_target >= _SURE_OF_TARGET)
-        shown: np.ndarray = undecoded | (rings.confidence >= _CERTAIN)
-        return shown
+        return undecoded | (rings.confidence >= _CERTAIN)
 
     def _targets(self, rings: Aligned, look: _Look) -> list[Target]:
         """Return the targets of the readings that are sure enough."""
@@ -339,8 +338,7 @@ def _best(rings: Aligned, prior: Prior) -> Aligned:
 def _near(frames: np.ndarray, others: np.ndarray) -> np.ndarray:
     """Return whether targets (k, 3, 3) are at the places of others (n, 3, 3), shape (k, n)."""
     away = np.hypot(*(frames[:, None, :2, 2] - others[None, :, :2, 2]).transpose(2, 0, 1))
-    near: np.ndarray = away < _SAME_PLACE * frame.mean_radii(others)
-    return near
+    return away < _SAME_PLACE * frame.mean_radii(others)
 
 
 def _alone(frames: np.ndarray, others: np.ndarray) -> np.ndarray:

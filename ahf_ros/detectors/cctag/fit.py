@@ -77,8 +77,7 @@ class Fit:
         """Covariance of the centre, px^2, (2, 2)."""
         affine = frame.local_affine(self.formed.frame)
         covariance = _OF_VARIANCE * affine @ self.covariance[:2, :2] @ affine.T
-        of_centre: np.ndarray = covariance + _SYSTEMATIC**2 * np.eye(2)
-        return of_centre
+        return covariance + _SYSTEMATIC**2 * np.eye(2)
 
     def misfit(self, usual: Usual) -> float:
         """Return the mean of squares of errors in their deviations, of which none counts much."""
@@ -144,8 +143,7 @@ class Usual:
 
     def variances(self, shown: np.ndarray) -> np.ndarray:
         """Return the variances of gray values."""
-        variances: np.ndarray = self.noise[0] + self.noise[1] * np.maximum(shown, 0)
-        return variances
+        return self.noise[0] + self.noise[1] * np.maximum(shown, 0)
 
     def prior(self, patch: Patch, formed: Formed) -> tuple[np.ndarray, np.ndarray]:
         """Return the normal matrix (p, p) and the right side (p,) of what is known."""

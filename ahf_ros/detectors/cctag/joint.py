@@ -81,8 +81,7 @@ def contested(gray: np.ndarray, rings: Aligned, polarity: int, family: CircleFam
 
 
 def _small(rings: Aligned) -> np.ndarray:
-    small: np.ndarray = frame.ellipse_axes(rings.frames)[0] <= _LARGEST
-    return small
+    return frame.ellipse_axes(rings.frames)[0] <= _LARGEST
 
 
 @dataclass(frozen=True, slots=True)

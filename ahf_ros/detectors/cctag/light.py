@@ -161,8 +161,7 @@ def shares_alike(gray: np.ndarray, frames: np.ndarray) -> np.ndarray:
     values = np.exp(scene.seen - slopes[:, 0] * _X - slopes[:, 1] * _Y)
     values /= values.mean(axis=2, keepdims=True)
     means, rays = less_lines(values.mean(axis=1), _EVERY), less_lines(values, _EVERY)
-    shares: np.ndarray = (means**2).sum(axis=1) / (rays**2).sum(axis=2).mean(axis=1)
-    return shares
+    return (means**2).sum(axis=1) / (rays**2).sum(axis=2).mean(axis=1)
 
 
 @dataclass(frozen=True, slots=True)
@@ -272,8 +271,7 @@ class _Scene(ArrayRecord):
         index = np.arange(normal.shape[1])
         normal[:, index, index] *= 1 + damping
         normal[:, index, index] += extra + 1e-7
-        solved: np.ndarray = np.linalg.solve(normal, right)[..., 0]
-        return solved
+        return np.linalg.solve(normal, right)[..., 0]
 
 
 def _first_look(rest: np.ndarray, size: np.ndarray, count: int) -> np.ndarray:
@@ -348,21 +346,18 @@ def _logarithms(share: np.ndarray, edges: np.ndarray) -> tuple[np.ndarray, np.nd
 
 
 def _own_widths(edges: np.ndarray, width: np.ndarray) -> np.ndarray:
-    own: np.ndarray = width[:, None, None, None] * np.exp(_columns(edges)[4])
-    return own
+    return width[:, None, None, None] * np.exp(_columns(edges)[4])
 
 
 def usual_widths(size: np.ndarray) -> np.ndarray:
     """Return the usual widths of edges, in radii, about targets of so many px."""
-    widths: np.ndarray = np.maximum(_WIDTH / size, _SHARPEST).astype(np.float32)
-    return widths
+    return np.maximum(_WIDTH / size, _SHARPEST).astype(np.float32)
 
 
 def _mixed(light: np.ndarray, slope: np.ndarray, blur: np.ndarray, step: float) -> np.ndarray:
     """Return what blur adds to ln I where light and ink change at once, to the second order."""
     change = np.gradient(light, step, axis=2) * (blur**2)[:, None, None]
-    mixed: np.ndarray = (change * slope[:, None]).astype(np.float32)
-    return mixed
+    return (change * slope[:, None]).astype(np.float32)
 
 
 def _less_means(basis: np.ndarray, weight: np.ndarray, paper: int = len(_RADII)) -> np.ndarray:
@@ -371,8 +366,7 @@ def _less_means(basis: np.ndarray, weight: np.ndarray, paper: int = len(_RADII))
     if paper < basis.shape[-1]:
         sums[..., paper:] = sums[..., paper:].mean(axis=-1, keepdims=True)
         total[..., paper:] = total[..., paper:].mean(axis=-1, keepdims=True)
-    less: np.ndarray = basis - (sums / total)[..., None, :]
-    return less
+    return basis - (sums / total)[..., None, :]
 
 
 def _interpolated(values: np.ndarray, radii: np.ndarray) -> np.ndarray:
@@ -381,12 +375,10 @@ def _interpolated(values: np.ndarray, radii: np.ndarray) -> np.ndarray:
     at = radii.clip(known[0], known[-1])
     below = np.searchsorted(known, at, side='right').clip(1, len(known) - 1) - 1
     rise = np.diff(values, axis=1) / np.diff(known)
-    between: np.ndarray = rise[:, below] * (at - known[below]) + values[:, below]
-    return between
+    return rise[:, below] * (at - known[below]) + values[:, below]
 
 
 def _slopes(values: np.ndarray, weight: np.ndarray) -> np.ndarray:
     """Return the slopes by the radius, (k, n), of the means of circles."""
     means = (weight * values).sum(axis=1) / weight.sum(axis=1)
-    slopes: np.ndarray = np.gradient(means, _STEP, axis=1).astype(np.float32)
-    return slopes
+    return np.gradient(means, _STEP, axis=1).astype(np.float32)

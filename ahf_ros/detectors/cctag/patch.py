@@ -63,8 +63,7 @@ class Formed:
     @property
     def heights(self) -> np.ndarray:
         """By how much light grows at edges, ln, (e,)."""
-        heights: np.ndarray = self.edges[:, _HEIGHT]
-        return heights
+        return self.edges[:, _HEIGHT]
 
     def of_light(self, size: float) -> tuple[np.ndarray, np.ndarray]:
         """Return what is alike of all edges of light, and its derivatives by parameters, (e, 2).
@@ -268,8 +267,7 @@ def _mixed(values: np.ndarray, rows: np.ndarray, columns: np.ndarray) -> np.ndar
     down, across = (np.exp(-0.5 * of**2) for of in (rows, columns))
     down /= down.sum(axis=1, keepdims=True)
     across /= across.sum(axis=1, keepdims=True)
-    mixed: np.ndarray = down @ values @ across.T
-    return mixed
+    return down @ values @ across.T
 
 
 def _grid(x: np.ndarray, y: np.ndarray) -> np.ndarray:

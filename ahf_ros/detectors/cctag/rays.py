@@ -114,8 +114,7 @@ class Rays(ArrayRecord):
     def deviations(self, values: np.ndarray) -> np.ndarray:
         """Return the differences of values from the weighted means of their rays."""
         total = np.maximum(self.weight.sum(axis=2, keepdims=True), 1e-9)
-        away: np.ndarray = values - (self.weight * values).sum(axis=2, keepdims=True) / total
-        return away
+        return values - (self.weight * values).sum(axis=2, keepdims=True) / total
 
     def equations(self, changes: np.ndarray, ink: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the normal equations of the changes of a frame and of edges.
@@ -140,8 +139,7 @@ class Rays(ArrayRecord):
 
 def clipped(values: np.ndarray) -> np.ndarray:
     """Return which gray values the camera has clipped."""
-    clipped: np.ndarray = (values <= BLACK + _CLIPPED) | (values >= WHITE - _CLIPPED)
-    return clipped
+    return (values <= BLACK + _CLIPPED) | (values >= WHITE - _CLIPPED)
 
 
 def is_drawing(gray: np.ndarray) -> bool:

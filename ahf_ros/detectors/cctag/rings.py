@@ -104,8 +104,7 @@ class Prior:
         """Return what is taken from ln of the odds of rings of a size, px, shape (k,)."""
         away = self.away(rings.shift, rings.blur, rings.sharpening) / self.deviations
         independent = size * np.ptp(PROFILE) / _INDEPENDENT
-        cost: np.ndarray = (independent * rings.known * rings.left + (away**2).sum(axis=1)) / 2
-        return cost
+        return (independent * rings.known * rings.left + (away**2).sum(axis=1)) / 2
 
     def away(self, shift: np.ndarray, blur: np.ndarray, sharpening: np.ndarray) -> np.ndarray:
         """Return how far edges are from what is known, in the units of deviations, (k, 3)."""
@@ -208,8 +207,7 @@ class Aligned(ArrayRecord):
     @property
     def confidence(self) -> np.ndarray:
         """Probability that there is a target with the ID, shape (k,)."""
-        confidence: np.ndarray = self.of_target * self.of_id
-        return confidence
+        return self.of_target * self.of_id
 
 
 NOTHING = Aligned(
@@ -293,8 +291,7 @@ def identify_in(
 def _unlike_before(ids: np.ndarray) -> np.ndarray:
     """Return which IDs are not in their row before, shape (k, n)."""
     same = ids[:, :, None] == ids[:, None]
-    unlike: np.ndarray = same.argmax(axis=2) == np.arange(ids.shape[1])
-    return unlike
+    return same.argmax(axis=2) == np.arange(ids.shape[1])
 
 
 def _settled(
@@ -374,16 +371,14 @@ def _unlike_discs(profiles: np.ndarray, shares: np.ndarray, frames: np.ndarray) 
         of_two[of_size] = two_discs(profiles[of_size], step)
     left_by_two, left = (np.maximum(1 - of, 1e-6) for of in (of_two, shares))
     better = np.log(left_by_two / left) >= -_LIKE_DISCS / frame.mean_radii(frames)
-    rings: np.ndarray = (shares >= _ALIKE) & better
-    return rings
+    return (shares >= _ALIKE) & better
 
 
 def show_the_same(gray: np.ndarray, lights: Lights) -> np.ndarray:
     """Return whether most of what rays show in a light is the same on all of them, shape (k,)."""
     values = lit(gray, lights.moved, lights).values
     means, rays = less_lines(values.mean(axis=1)), less_lines(values)
-    same: np.ndarray = (means**2).sum(axis=1) >= _SHARED * (rays**2).sum(axis=2).mean(axis=1)
-    return same
+    return (means**2).sum(axis=1) >= _SHARED * (rays**2).sum(axis=2).mean(axis=1)
 
 
 def in_light(gray: np.ndarray, rings: Aligned, family: CircleFamily) -> np.ndarray:
@@ -517,8 +512,7 @@ def _aligned(
 def _unusual(shift: np.ndarray, blur: np.ndarray, prior: Prior) -> np.ndarray:
     """Return half the squares of deviations of edges, (k,): chance finds rings of any growth."""
     deviations = np.stack([shift - prior.shift, np.log(blur / prior.blur)], axis=1) / _USUAL_EDGES
-    squares: np.ndarray = (deviations**2).sum(axis=1) / 2
-    return squares
+    return (deviations**2).sum(axis=1) / 2
 
 
 def _hiding(
@@ -528,8 +522,7 @@ def _hiding(
     grown = _GROWTH_HIDES * (shift / (MAXIMUM_SHIFT * narrow)) ** 8
     sharpened = _SHARPENING_HIDES * sharpening**2 / (1 + np.abs(sharpening))
     others = sharpened + _CLIPPING_HIDES * (1 - known)
-    hidden: np.ndarray = grown + others * (MASK / narrow) ** 2
-    return hidden
+    return grown + others * (MASK / narrow) ** 2
 
 
 def usual_perspective(frames: np.ndarray) -> np.ndarray:
@@ -541,8 +534,7 @@ def usual_perspective(frames: np.ndarray) -> np.ndarray:
     tilt = np.sqrt(np.maximum((axes[:, 0] / axes[:, 1]) ** 2 - 1, 0))
     most = np.stack([np.full(len(frames), _LEAST_TILT), tilt + _LEAST_TILT], axis=1)
     weight = (most * _PERSPECTIVE * frame.mean_radii(frames)[:, None]) ** -2
-    usual: np.ndarray = directions.transpose(0, 2, 1) * weight[:, None] @ directions
-    return usual
+    return directions.transpose(0, 2, 1) * weight[:, None] @ directions
 
 
 def _plain(seen: np.ndarray, rings: np.ndarray, good: np.ndarray, blur: np.ndarray) -> np.ndarray:
@@ -567,5 +559,4 @@ def _plain(seen: np.ndarray, rings: np.ndarray, good: np.ndarray, blur: np.ndarr
     both -= 2 * alike * along[:, :, None] * along[:, None]
     of_two = (both / np.maximum(1 - alike**2, 1e-3)).max(axis=(1, 2)) / total
     of_ink = (ink * profile).sum(axis=1) ** 2 / np.maximum((ink**2).sum(axis=1), 1e-12) / total
-    plain: np.ndarray = np.log(np.maximum(1 - of_two, 1e-6) / np.maximum(1 - of_ink, 1e-6))
-    return plain
+    return np.log(np.maximum(1 - of_two, 1e-6) / np.maximum(1 - of_ink, 1e-6))

@@ -33,8 +33,7 @@ CLIPPED = 0.25, 0.5
 
 def size_steps(size: np.ndarray) -> np.ndarray:
     """Return the steps of radii, px, int, of the shape of these."""
-    steps: np.ndarray = np.rint(np.log(np.maximum(size, 1.0)) / math.log(SIZE_STEP)).astype(int)
-    return steps
+    return np.rint(np.log(np.maximum(size, 1.0)) / math.log(SIZE_STEP)).astype(int)
 
 
 def by_value(values: np.ndarray) -> list[tuple[int, np.ndarray]]:
@@ -63,8 +62,7 @@ def shares_of(profiles: np.ndarray, of_rings: np.ndarray) -> np.ndarray:
 
     Both are weighted and less straight lines. Ink is below paper.
     """
-    shares: np.ndarray = np.minimum(profiles @ of_rings.T, 0) ** 2 / totals(profiles)[:, None]
-    return shares
+    return np.minimum(profiles @ of_rings.T, 0) ** 2 / totals(profiles)[:, None]
 
 
 def totals(profiles: np.ndarray) -> np.ndarray:
@@ -84,8 +82,7 @@ def _weights(every: int) -> tuple[np.ndarray, np.ndarray]:
 def _normalised(inks: np.ndarray, every: int) -> np.ndarray:
     """Return weighted inks less straight lines, with squares of a sum of 1, float32."""
     inks = less_lines(inks, every)
-    normalised: np.ndarray = inks / np.linalg.norm(inks, axis=1, keepdims=True)
-    return normalised
+    return inks / np.linalg.norm(inks, axis=1, keepdims=True)
 
 
 @lru_cache(maxsize=256)
@@ -131,8 +128,7 @@ def _discs_along(signed: np.ndarray, size: float, edges: np.ndarray, every: int)
         sign * normal_integral((radii - _places(of, size)[..., ::every] * size) / of)
         for of in (blur, np.hypot(blur, np.float32(MASK)))
     )
-    along: np.ndarray = (1 + more) * seen - more * masked
-    return along
+    return (1 + more) * seen - more * masked
 
 
 def _clipped(inks: np.ndarray, shares: np.ndarray) -> np.ndarray:
@@ -207,8 +203,7 @@ def _blurred(
 
 def _places(blur: np.ndarray, size: np.ndarray | float) -> np.ndarray:
     """Return where along the profile blur moves what lies near to the centre, outwards (Rice)."""
-    places: np.ndarray = np.sqrt(ALONG**2 + (blur / size) ** 2)
-    return places
+    return np.sqrt(ALONG**2 + (blur / size) ** 2)
 
 
 def _signs(radii: np.ndarray) -> np.ndarray:

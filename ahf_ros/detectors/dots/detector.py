@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -104,7 +104,7 @@ def find_rings(pyramid: ImagePyramid, settings: DetectorSettings, code: DotFamil
     return Rings.joined(found)
 
 
-def _moved(target: DottedTarget, change: np.ndarray) -> tuple:
+def _moved(target: DottedTarget, change: np.ndarray) -> tuple[Any, ...]:
     """Return the ellipses of a target after a change of its frame, shape (3, 3)."""
     frames = change @ affine_frames(*np.array(target.dots).T)
     columns = (*(frames[:, :2, 2] / frames[:, 2:, 2]).T, *ellipse_axes(frames))

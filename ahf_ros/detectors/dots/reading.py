@@ -112,5 +112,4 @@ def read_rings(log: np.ndarray, fit: Fit, code: DotFamily) -> Readings:
 
 def dot_points(angles: np.ndarray, code: DotFamily) -> np.ndarray:
     """Return the centres of small dots in directions, rad clockwise from +x, shape (..., 2)."""
-    points: np.ndarray = code.dot_circle * np.stack([np.cos(angles), np.sin(angles)], axis=-1)
-    return points
+    return code.dot_circle * np.stack([np.cos(angles), np.sin(angles)], axis=-1)

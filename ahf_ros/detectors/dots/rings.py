@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -238,7 +239,9 @@ def _targets(rings: Rings, ids: np.ndarray, code: DotFamily) -> list[DottedTarge
     ]
 
 
-def _ellipses(frame: np.ndarray, word: int, phase: float, radius: float, code: DotFamily) -> tuple:
+def _ellipses(
+    frame: np.ndarray, word: int, phase: float, radius: float, code: DotFamily
+) -> tuple[Any, ...]:
     """Return the ellipses of disc, border and dots of one ring as `DottedTarget` has them."""
     which = np.flatnonzero(word >> np.arange(code.bits) & 1)
     points = dot_points(phase - 2 * np.pi * which / code.bits, code)

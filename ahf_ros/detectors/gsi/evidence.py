@@ -219,8 +219,7 @@ def _ink_and_light(template: np.ndarray, polarity: np.ndarray) -> tuple[np.ndarr
 
 
 def _gray(logarithm: np.ndarray) -> np.ndarray:
-    gray: np.ndarray = np.maximum(np.exp(logarithm) - LOG_OFFSET, 0.0)
-    return gray
+    return np.maximum(np.exp(logarithm) - LOG_OFFSET, 0.0)
 
 
 def _level_ratios(template: np.ndarray) -> np.ndarray:
@@ -248,8 +247,7 @@ def _densities(values: np.ndarray) -> np.ndarray:
     count = len(values)
     bins = _bins(values) + _BINS * np.arange(count)[:, None, None]
     counts = np.bincount(bins.ravel(), minlength=_BINS * count).reshape(count, _BINS)
-    densities: np.ndarray = counts @ _SMOOTHING / (bins[0].size * _BIN if count else 1.0)
-    return densities
+    return counts @ _SMOOTHING / (bins[0].size * _BIN if count else 1.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -318,8 +316,7 @@ def _most_support(seen: _Seen, family: PointFamily) -> np.ndarray:
     telling = seen.inside[:, count:] & (gaps.min(axis=0) >= seen.scale[:, None])
     lacking = (_MAXIMUM_FOR - template).sum(axis=1) + np.where(telling, missing, 0.0).sum(axis=1)
     dots, empty = count + family.rule.dots, len(family.positions) - family.rule.dots
-    most: np.ndarray = 1 - lacking / (dots * _MAXIMUM_FOR + empty * _MAXIMUM_AGAINST)
-    return most
+    return 1 - lacking / (dots * _MAXIMUM_FOR + empty * _MAXIMUM_AGAINST)
 
 
 @lru_cache(maxsize=8)
@@ -336,8 +333,7 @@ def _covered(marked: np.ndarray, scale: np.ndarray, family: PointFamily) -> np.n
     """Return which positions lie within two radii of a dot, shape (k, positions)."""
     count, near = len(family.template), _gaps(family) < scale[:, None, None]
     shown = np.concatenate([np.ones((len(marked), count), bool), marked], axis=1)
-    covered: np.ndarray = (near & shown[:, :, None]).any(axis=1)
-    return covered
+    return (near & shown[:, :, None]).any(axis=1)
 
 
 @lru_cache(maxsize=8)

@@ -344,8 +344,7 @@ def _affine(
 ) -> np.ndarray:
     """Return the linear maps, shape (k, 2, 2), that take two arms to their images."""
     images = np.array([[first.real, second.real], [first.imag, second.imag]]).transpose(2, 0, 1)
-    maps: np.ndarray = images @ np.linalg.inv(np.stack([arm, other], axis=1))
-    return maps
+    return images @ np.linalg.inv(np.stack([arm, other], axis=1))
 
 
 def _bears_out(
@@ -378,8 +377,7 @@ def _bears_out(
 
 
 def _cross(first: np.ndarray, second: np.ndarray) -> np.ndarray:
-    area: np.ndarray = first[..., 0] * second[..., 1] - first[..., 1] * second[..., 0]
-    return area
+    return first[..., 0] * second[..., 1] - first[..., 1] * second[..., 0]
 
 
 def _fitted(dots: Dots, members: np.ndarray, family: PointFamily) -> Templates:
@@ -415,8 +413,7 @@ def _mostly_empty(templates: Templates, nearest: Nearest, family: PointFamily) -
     found, _ = nearest(single[:, :2, 2], np.linalg.inv(single[:, :2, :2]), 1.0)
     found = np.sort(found.reshape(frames.shape[:2]), axis=1)
     different = (np.diff(found, axis=1, prepend=-1) > 0).sum(axis=1)
-    empty: np.ndarray = different <= family.rule.dots + _STRAY
-    return empty
+    return different <= family.rule.dots + _STRAY
 
 
 def _best(templates: Templates) -> Templates:

@@ -176,7 +176,6 @@ def _within_each(points: np.ndarray, frames: np.ndarray) -> Rivals:
 
     def within(index: int) -> np.ndarray:
         relative = (points - centres[index]) @ inverse[index]
-        some: np.ndarray = (relative**2).sum(axis=1) < 1
-        return some
+        return (relative**2).sum(axis=1) < 1
 
     return within

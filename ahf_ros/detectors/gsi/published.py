@@ -75,8 +75,7 @@ def p2_invariant(ratio: Any) -> np.ndarray:
         value = np.where(np.abs(value) > 1, 1 / value, value)
     first = np.polyval([1, -3, 3, -1, 3, -3, 1], value)
     second = np.polyval([2, -6, 9, -8, 9, -6, 2], value)
-    invariant: np.ndarray = second / first
-    return invariant
+    return second / first
 
 
 def area_cross_ratio(pivot: Any, points: Any) -> np.ndarray:
@@ -199,8 +198,7 @@ def _roles(code: PointFamily) -> list[int]:
 
 
 def _cross(first: np.ndarray, second: np.ndarray) -> np.ndarray:
-    area: np.ndarray = first[..., 0] * second[..., 1] - first[..., 1] * second[..., 0]
-    return area
+    return first[..., 0] * second[..., 1] - first[..., 1] * second[..., 0]
 
 
 @dataclass(frozen=True, slots=True)

@@ -202,5 +202,4 @@ def ellipse_centres(homographies: np.ndarray, points: np.ndarray, radii: np.ndar
     # The pole of the line at infinity with respect to the dual conic of the image.
     along = radii[..., None] ** 2 * (slope @ homographies[:, :, :2].transpose(0, 2, 1))
     pole = images * images[..., 2:] - along
-    centres: np.ndarray = pole[..., :2] / pole[..., 2:]
-    return centres
+    return pole[..., :2] / pole[..., 2:]

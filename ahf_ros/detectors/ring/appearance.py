@@ -96,5 +96,4 @@ def _step_shares(polar: PolarImages, ground: np.ndarray) -> np.ndarray:
     of_paper = np.tensordot(light, plane, axes=1)
     paper = np.maximum(np.exp(light[:, :1]) - LOG_OFFSET, 0)
     step = np.log(polar.inked(paper, paper) + LOG_OFFSET) - light[:, :1]
-    shares: np.ndarray = (values - of_paper) / np.where(step == 0, np.inf, step)[..., None]
-    return shares
+    return (values - of_paper) / np.where(step == 0, np.inf, step)[..., None]

@@ -263,8 +263,7 @@ def _crossing(ink: np.ndarray, at: np.ndarray) -> np.ndarray:
     before, after = (np.take_along_axis(ink, (at + of)[..., None], 2)[..., 0] for of in (0, 1))
     step = np.where(np.abs(after - before) > 1e-6, after - before, 1)
     share = np.clip((0.5 - before) / step, 0, 1)
-    crossing: np.ndarray = _RADII[at] + share * (_RADII[1] - _RADII[0])
-    return crossing
+    return _RADII[at] + share * (_RADII[1] - _RADII[0])
 
 
 def _mean(values: np.ndarray, which: np.ndarray) -> np.ndarray:
@@ -330,5 +329,4 @@ def grid_phases(place: np.ndarray, row: np.ndarray, count: int, bits: int) -> np
     """Return where the grids of targets begin, rad."""
     turns = np.exp(1j * bits * place)
     across, down = (np.bincount(row, of, count) for of in (turns.real, turns.imag))
-    phase: np.ndarray = np.arctan2(down, across) / bits
-    return phase
+    return np.arctan2(down, across) / bits

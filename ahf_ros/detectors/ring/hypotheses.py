@@ -74,14 +74,12 @@ class Hypotheses(ArrayRecord):
     @property
     def certain(self) -> np.ndarray:
         """Whether words are certain enough to be reported, ndarray of bool, shape (k,)."""
-        certain: np.ndarray = self.confidence >= CERTAIN
-        return certain
+        return self.confidence >= CERTAIN
 
     @property
     def clear(self) -> np.ndarray:
         """Whether no other family may explain the bands of certain words better, shape (k,)."""
-        clear: np.ndarray = self.certain & (self.coded > _CLEAR)
-        return clear
+        return self.certain & (self.coded > _CLEAR)
 
     @property
     def shift(self) -> np.ndarray:

@@ -198,5 +198,4 @@ def _read(
         values.take(left, axis=1) * (1 - across) + values.take(left + 1, axis=1) * across
         for left in (place, below)
     )
-    read: np.ndarray = upper * (1 - down) + lower * down
-    return read
+    return upper * (1 - down) + lower * down

@@ -356,8 +356,7 @@ def _step_evidence(
 
 def _gain(paper: np.ndarray, ink: np.ndarray) -> np.ndarray:
     """Return how much larger an error of paper is in the ink that is expected of it, of ln."""
-    gain: np.ndarray = (ink / np.maximum(paper, 1)) * (paper + LOG_OFFSET) / (ink + LOG_OFFSET)
-    return gain
+    return (ink / np.maximum(paper, 1)) * (paper + LOG_OFFSET) / (ink + LOG_OFFSET)
 
 
 def level_evidence(
@@ -495,5 +494,4 @@ def _surprise(errors: np.ndarray, width: np.ndarray, which: np.ndarray) -> np.nd
 
 def normal(values: np.ndarray, spread: np.ndarray) -> np.ndarray:
     """Return the densities of values under normal distributions about 0."""
-    density: np.ndarray = np.exp(-0.5 * (values / spread) ** 2) / (spread * math.sqrt(2 * math.pi))
-    return density
+    return np.exp(-0.5 * (values / spread) ** 2) / (spread * math.sqrt(2 * math.pi))

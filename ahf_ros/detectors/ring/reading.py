@@ -150,8 +150,7 @@ def best_growth(
     score = np.maximum(ink - np.maximum(paper, 0), 0).sum(axis=1).reshape(len(_SHIFTS), -1)
     unusual = (np.multiply.outer(_SHIFTS, polar.polarity) - prior.shift) / prior.deviation
     best = (score - 0.5 * unusual**2).argmax(axis=0)
-    growth: np.ndarray = tried.reshape(score.shape)[best, np.arange(len(best))]
-    return growth
+    return tried.reshape(score.shape)[best, np.arange(len(best))]
 
 
 def _doubtful(words: Words, edges: Evidence) -> np.ndarray:
@@ -235,8 +234,7 @@ def _mean_odds(words: Words, weight: np.ndarray) -> np.ndarray:
 
 def _of_reading(odds: np.ndarray, words: Words, weight: np.ndarray) -> np.ndarray:
     """Return log odds of words, shape (k,), for a reading."""
-    mean: np.ndarray = odds / (weight * words.hidden.shape[1])
-    return mean
+    return odds / (weight * words.hidden.shape[1])
 
 
 def _overhang(growth: np.ndarray, family: Family) -> np.ndarray:

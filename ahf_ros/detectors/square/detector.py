@@ -174,8 +174,7 @@ def _are_read(
     sure = np.concatenate(corners)[np.concatenate(readings)[:, 3] > _SURE]
     distances = np.linalg.norm(places.mean(axis=1)[:, None] - sure.mean(axis=1), axis=2)
     near = distances <= _SAME_PLACE * side_lengths(places).max(axis=1)[:, None]
-    read_before: np.ndarray = near.any(axis=1)
-    return read_before
+    return near.any(axis=1)
 
 
 def _laid(
@@ -242,8 +241,7 @@ def _odds_together(readings: np.ndarray, one_place: Rivals, groups: Groups) -> n
         there = max(whole[:size].max() - alone, surest[:size].sum() - doubt)
         rivals = -leading[:size].sum()
         against[of_this & (number < size)] = np.logaddexp(-there, rivals)
-    of_image: np.ndarray = -np.logaddexp(-odds, against)
-    return of_image
+    return -np.logaddexp(-odds, against)
 
 
 def _one_place(corners: np.ndarray) -> Rivals:
@@ -253,8 +251,7 @@ def _one_place(corners: np.ndarray) -> Rivals:
 
     def near(index: int) -> np.ndarray:
         distances = np.linalg.norm(middles - middles[index], axis=1)
-        some: np.ndarray = distances <= _SAME_PLACE * np.maximum(sizes, sizes[index])
-        return some
+        return distances <= _SAME_PLACE * np.maximum(sizes, sizes[index])
 
     return near
 

@@ -63,8 +63,7 @@ def centres(corners: np.ndarray) -> np.ndarray:
 
 def side_lengths(corners: np.ndarray) -> np.ndarray:
     """Return the lengths of sides, shape (k, 4)."""
-    lengths: np.ndarray = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2)
-    return lengths
+    return np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2)
 
 
 def square_frames(corners: np.ndarray) -> np.ndarray:
@@ -78,8 +77,7 @@ def changed(frames: np.ndarray, changes: np.ndarray) -> np.ndarray:
     """Return frames after changes, shape (k, 8)."""
     moved = np.tile(np.eye(3), (len(frames), 1, 1))
     moved.reshape(-1, 9)[:, :PLACE] += changes
-    together: np.ndarray = frames @ moved
-    return together
+    return frames @ moved
 
 
 def derivatives(frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -84,8 +84,7 @@ def find_quadrilaterals(gray: np.ndarray) -> np.ndarray:
     apart = corners.astype(np.float32)  # in which corners that are nearly one are one
     along = np.roll(apart, -1, axis=1) - apart
     turns = np.sign(_cross(along, np.roll(along, -1, axis=1)))
-    convex: np.ndarray = corners[np.abs(turns.sum(axis=1)) == 4]
-    return convex
+    return corners[np.abs(turns.sum(axis=1)) == 4]
 
 
 def _outlines(dark: np.ndarray) -> list[np.ndarray]:
@@ -246,5 +245,4 @@ def _lines(regions: _Regions, which: np.ndarray, sides: np.ndarray) -> np.ndarra
     across += regions.growths[which, None]
     ends = np.stack([across + slope * (end - middle) for end in (-0.5, 0.5)], axis=2)
     lines = sides + ends[..., None] * normals[:, :, None]
-    fitted: np.ndarray = lines[count.min(axis=1) >= _FEWEST]
-    return fitted
+    return lines[count.min(axis=1) >= _FEWEST]

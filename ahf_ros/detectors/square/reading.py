@@ -178,8 +178,7 @@ def _dark_inside(gray: np.ndarray, frames: np.ndarray, depth: float) -> np.ndarr
     if not len(frames):
         return np.zeros(0, bool)
     dark = logs(-0.5 - _DEPTH) - logs(-0.5 + depth) > _MINIMUM_STEP / 2
-    inside: np.ndarray = dark.mean(axis=2).min(axis=1) >= _SIDE
-    return inside
+    return dark.mean(axis=2).min(axis=1) >= _SIDE
 
 
 def _evidence(

@@ -27,8 +27,7 @@ def parallel_odds(frames: np.ndarray, width: int) -> np.ndarray:
     largest, smallest = np.linalg.svd(along, compute_uv=False).T
     usual = _CORNER_ERROR / smallest + largest / (_FOCAL_LENGTH * width)
     relative = np.linalg.norm(converging, axis=1) / usual
-    odds: np.ndarray = -np.minimum(relative**2 / 2, _CONVERGING)
-    return odds
+    return -np.minimum(relative**2 / 2, _CONVERGING)
 
 
 def corner_odds(levels: np.ndarray, depths: np.ndarray, sharpness: float) -> np.ndarray:
@@ -44,5 +43,4 @@ def corner_odds(levels: np.ndarray, depths: np.ndarray, sharpness: float) -> np.
         Inverse of the variance of a level.
     """
     blurred = 1 - normal_integral(depths).prod(axis=1, keepdims=True)
-    odds: np.ndarray = sharpness * (1 - blurred) * ((1 + blurred) / 2 - levels)
-    return odds
+    return sharpness * (1 - blurred) * ((1 + blurred) / 2 - levels)

@@ -75,14 +75,12 @@ def file_name(solution: Solution, photograph: int) -> str:
 
 def oriented(solution: Solution) -> list[int]:
     """Return the numbers of the photographs that have a pose."""
-    numbers: list[int] = np.flatnonzero(solution.oriented).tolist()
-    return numbers
+    return np.flatnonzero(solution.oriented).tolist()
 
 
 def determined(solution: Solution) -> list[int]:
     """Return the numbers of the targets that have coordinates."""
-    numbers: list[int] = np.flatnonzero(solution.determined).tolist()
-    return numbers
+    return np.flatnonzero(solution.determined).tolist()
 
 
 def used_points(solution: Solution) -> Iterator[Seen]:

@@ -79,8 +79,7 @@ def _camera_list(solution: Solution) -> list[dict[str, Any]]:
 
 
 def _sensors(solution: Solution) -> list[int]:
-    sensors: list[int] = np.flatnonzero(solution.calibrated).tolist()
-    return sensors
+    return np.flatnonzero(solution.calibrated).tolist()
 
 
 def _internals(solution: Solution, camera: int) -> dict[str, Any]:

@@ -26,5 +26,4 @@ class Grain:
         offset = part * (_SIDE // 4) + _SIDE // 8
         columns = np.floor(width * scale).astype(np.int32) + offset
         rows = np.floor(height * scale).astype(np.int32) + offset
-        noise: np.ndarray = self._values[rows & (_SIDE - 1), columns & (_SIDE - 1)]
-        return noise
+        return self._values[rows & (_SIDE - 1), columns & (_SIDE - 1)]

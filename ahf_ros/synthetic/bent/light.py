@@ -134,8 +134,7 @@ def surface_light(
 
 def _product(first: Vectors, second: Vectors) -> np.ndarray:
     """Return the scalar product of vectors."""
-    product: np.ndarray = first[0] * second[0] + first[1] * second[1] + first[2] * second[2]
-    return product
+    return first[0] * second[0] + first[1] * second[1] + first[2] * second[2]
 
 
 def _scaled(vectors: Vectors, factor: np.ndarray) -> list[np.ndarray]:
