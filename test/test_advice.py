@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import re
-import sys
-from collections.abc import Callable
 from dataclasses import replace
 
 import cv2
@@ -16,6 +14,7 @@ from ahf_ros.codes.ring import ring_family
 from ahf_ros.detectors import DetectorSettings
 from ahf_ros.interchange.image_files import write_image
 from ahf_ros.synthetic.scene import SceneSettings
+from support.calls import calls_of
 from support.command_line import status
 from support.scenes import rendered
 
@@ -127,21 +126,6 @@ def test_a_filter_is_advised_where_it_may_show_more() -> None:
     assert advice(image, settings, expected_targets=12) == []
 
 
-def calls_of(work: Callable[[], object]) -> int:
-    count = 0
-
-    def counted(_frame: object, event: str, _argument: object) -> None:
-        nonlocal count
-        count += event in ('call', 'c_call')
-
-    sys.setprofile(counted)
-    try:
-        work()
-    finally:
-        sys.setprofile(None)
-    return count
-
-
 def spots(across: int, down: int, radius: float) -> np.ndarray:
     image = np.full((960, 1280), 30, np.uint8)
     for y in (np.arange(down) + 0.5) * 960 / down:
@@ -165,7 +149,7 @@ def test_a_second_look_costs_little_where_nothing_is_a_target(
     settings = DetectorSettings(family=family)
     advice(image[:200, :200], settings)  # modules are imported, tables made
     given: list[str] = []
-    assert calls_of(lambda: given.extend(advice(image, settings))) < 120_000
+    assert calls_of(lambda: given.extend(advice(image, settings))) < 45_000
     assert given == []
 
 
