@@ -7,7 +7,12 @@ from pathlib import Path
 
 import pytest
 
+from ahf_ros import SceneSettings, identify, render
+from ahf_ros.codes.dots import DOTS_DESIGN
 from ahf_ros.codes.families import files_by_name
+from ahf_ros.report.page import _reach
+from ahf_ros.report.results import result_from_json
+from ahf_ros.target import reach_of
 from support.command_line import status
 
 MINE = 'family: mine\nbits: 10\nband: [1.6, 2.4]\nwords: all\nnumbers: {first_bit: lowest}\n'
@@ -30,9 +35,25 @@ def test_a_family_of_the_user_is_rendered_identified_and_printed(
     assert status('render', tmp_path / 'images', '--family', 'mine', *size) == 0
     capsys.readouterr()
     assert status('identify', tmp_path / 'images', '--family', 'mine', '--json') == 0
-    targets = json.loads(capsys.readouterr().out)['targets']
-    assert [it['family'] for it in targets] == ['mine'] * 4
+    record = json.loads(capsys.readouterr().out)
+    assert [it['family'] for it in record['targets']] == ['mine'] * 4
+    assert (record['reach'], record['codes']['mine']['bits']) == ({'mine': 2.4}, 10)
+    result = result_from_json(record, tmp_path, 'record')
+    assert [_reach(name, [result]) for name in ('mine', 'aicon14', 'other')] == [2.4, 3.0, 1.0]
     assert status('targets', '--family', 'mine', '-o', tmp_path / 'sheet.svg') == 0
+
+
+def test_a_design_in_the_place_of_the_usual_one_keeps_its_name_in_results(tmp_path: Path) -> None:
+    file = tmp_path / 'wide.json'
+    design = json.loads(DOTS_DESIGN.read_text()) | {'family': 'wide', 'border_radius': 3.6}
+    file.write_text(json.dumps(design))
+    for name in ('wide', 'dots'):
+        scene = SceneSettings(
+            width=500, height=400, targets=2, dot_radius=9, family=name, family_file=str(file)
+        )
+        found = identify(render(scene).image, family=name, family_file=str(file))
+        assert (found.looked_for, [it.family for it in found]) == ('wide', ['wide'] * 2)
+        assert (list(found.prints), reach_of(found[0], found.prints)) == (['wide'], 3.6)
 
 
 def test_a_family_beside_the_photographs_comes_first(
