@@ -1,7 +1,10 @@
 """The edge shift of an image, from its targets, and what it means.
 
-Dark areas are larger than in the print where ink has spread, and smaller where there was too much
-light or the image is blurred.
+Dark areas are larger than in the print if ink has spread, and smaller if there was too much light.
+All families report the same: what has grown in light, where gray values are taken to be light to
+the power of 1 / `ahf_ros.imaging.image.GAMMA`. A linear camera seems to show more ink by up to two
+thirds of the standard deviation of its blur. Edges of wide marks do not show whether gray values
+have a gamma.
 """
 
 from __future__ import annotations
@@ -11,11 +14,10 @@ from statistics import median
 
 from ahf_ros.target import UNDECODED, Target
 
-NOTABLE_EDGE_SHIFT = 0.5
-"""Edge shift from which on an image is remarked on, px.
+NOTABLE_EDGE_SHIFTS = -0.5, 0.8
+"""Edge shifts from which on an image is remarked on, px: too bright, and too dark.
 
-The gamma of a camera alone makes edges 0.4 px too bright in a sharp image: up to half of the
-standard deviation of its blur.
+The latter is more than a sharp linear camera seems to show.
 """
 
 
@@ -42,10 +44,11 @@ def edge_shift_remark(shift: float | None) -> str:
     Examples
     --------
     >>> edge_shift_remark(-0.62)
-    'edges are 0.6 px too bright: the photograph is over-exposed or blurred'
+    'edges are 0.6 px too bright: the photograph is over-exposed'
     """
-    if shift is None or abs(shift) < NOTABLE_EDGE_SHIFT:
+    bright, dark = NOTABLE_EDGE_SHIFTS
+    if shift is None or bright < shift < dark:
         return ''
     if shift < 0:
-        return f'edges are {-shift:.1f} px too bright: the photograph is over-exposed or blurred'
-    return f'edges are {shift:.1f} px too dark: ink gain or under-exposure'
+        return f'edges are {-shift:.1f} px too bright: the photograph is over-exposed'
+    return f'edges are {shift:.1f} px too dark: ink gain, under-exposure or a linear camera'

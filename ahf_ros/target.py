@@ -40,8 +40,9 @@ class Target:
     family : str
         Name of the family of the code; empty if undecoded or unknown.
     edge_shift : float, optional
-        Length by which dark areas are larger in the image than in the print, on every edge, px:
-        positive where ink has grown, negative where light has. None where it was not measured.
+        Length by which dark areas are larger in the light that fell on the sensor than in the
+        print, on every edge, px: positive if ink has grown, negative if light has. The gamma of
+        gray values is taken out. None where it was not measured.
     polarity : int
         1 for a dark dot on bright ground, -1 for a bright one on dark, 0 where it is unknown.
 

@@ -13,6 +13,7 @@ from ahf_ros.target import Target
 
 if TYPE_CHECKING:
     import numpy as np
+    from typing_extensions import Self
 
     from ahf_ros.codes.prints import Print
     from ahf_ros.features.pyramid import ImagePyramid
@@ -322,9 +323,19 @@ class FamilyDetector(ABC):
     """A detector of one family of targets, whose design is read from the settings.
 
     It raises a ValueError if the family, or the data file that describes it, is not accepted.
+
+    Attributes
+    ----------
+    settings : DetectorSettings
+    expected : frozenset of int
+        IDs that are likely to be there. Empty: all IDs are equally likely.
+    contested : bool
+        Whether targets whose ID others have, too, are among the results, undecoded.
     """
 
     settings: DetectorSettings
+    expected: frozenset[int] = frozenset()
+    contested: bool = False
     contrast: ClassVar[int] = 1  # see `Searching`
 
     def __post_init__(self) -> None:
@@ -340,6 +351,14 @@ class FamilyDetector(ABC):
     @abstractmethod
     def design(self) -> Any:
         """Printed design of the family."""
+
+    def expecting(self, ids: frozenset[int]) -> Self:
+        """Return a detector that knows which IDs are likely; see `Expecting`."""
+        return replace(self, expected=ids)
+
+    def contesting(self) -> Self:
+        """Return a detector that also returns targets that share an ID; see `Contesting`."""
+        return replace(self, contested=True)
 
 
 def moved_targets(

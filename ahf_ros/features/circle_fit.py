@@ -27,6 +27,7 @@ from ahf_ros.features.edge_errors import (
     unevenness,
     weigh_edges,
 )
+from ahf_ros.features.growth import growth_in_light
 from ahf_ros.features.profiles import BLURS, USUAL_BLUR, Edges, measure_outlines
 from ahf_ros.features.robust import geman_mcclure, geman_mcclure_gain, median, reweight, spread
 
@@ -75,13 +76,18 @@ class Fit(ArrayRecord):
     deviation: np.ndarray  # (k,), standard deviation of these edges, px
     covariance: np.ndarray  # (k, 2, 2), of the image of the centre, px^2; NaN if not asked for
     blur: np.ndarray  # (k,), of the edges, standard deviation in px
-    edge_shift: np.ndarray  # (k,), by which what is dark has grown, px; 0 for a single circle
+    edge_shift: np.ndarray  # (k,), by which dark gray values have grown, px; 0: a single circle
     proportion: np.ndarray  # (k,), of the first circles beyond the dot, to those of their print
 
     @property
     def size(self) -> np.ndarray:
         """Radii of circles with the areas of the dots, px, shape (k,)."""
         return frame.mean_radii(self.frames)
+
+    @property
+    def growth(self) -> np.ndarray:
+        """By how much what is dark has grown in light, px, shape (k,)."""
+        return growth_in_light(self.edge_shift, self.blur, self.contrast)
 
     @property
     def clearness(self) -> np.ndarray:

@@ -22,7 +22,7 @@ from support.detector import values
         ({'mirrored': True}, 'the last image seems to be mirrored', 'mirrored', 'True'),
         (
             {'edge_shift': -0.62},
-            'edges are 0.6 px too bright: the photograph is over-exposed or blurred',
+            'edges are 0.6 px too bright: the photograph is over-exposed',
             'edge shift (px)',
             '-0.62',
         ),

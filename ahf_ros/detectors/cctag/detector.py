@@ -32,7 +32,7 @@ from ahf_ros.detectors.cctag.rings import (
     in_light,
     show_the_same,
 )
-from ahf_ros.detectors.claims import best_targets
+from ahf_ros.detectors.claims import reported
 from ahf_ros.detectors.contract import FamilyDetector, moved_targets
 from ahf_ros.features import frame
 from ahf_ros.features.candidates import cells_along, find_peaks
@@ -92,13 +92,16 @@ class CctagDetector(FamilyDetector):
         """Identify the targets of one image; see `Searching`."""
         pyramid, radii = _unclipped(pyramid), self.settings.radii
         kinds = list(product(self.settings.polarities, self.design))
-        looks = _looks(list(octaves(pyramid, *radii)), kinds)
+        looks = _looks(list(octaves(pyramid, *radii)), kinds, Prior(expected=self.expected))
 
         def identify(octave: Octave) -> list[Target]:
             return self._identify(octave.pyramid.gray, looks[octave.level])
 
         found = targets_of_octaves(pyramid, radii, identify, self.refine)
-        return sorted_targets(best_targets(found, 1.0))
+        everything = self.settings.report_undecoded
+        return sorted_targets(
+            reported(found, 1.0, _CERTAIN, everything=everything, contested=self.contested)
+        )
 
     @one_blas_thread()
     def refine(self, image: np.ndarray, targets: Sequence[Target]) -> list[Target]:
@@ -152,17 +155,14 @@ class CctagDetector(FamilyDetector):
 
     def _shown(self, rings: Aligned) -> np.ndarray:
         """Return which readings are sure enough to be reported, (k,)."""
-        undecoded = self.settings.report_undecoded & (rings.of_target >= _SURE_OF_TARGET)
-        return undecoded | (rings.confidence >= _CERTAIN)
+        unread = self.settings.report_undecoded & (rings.of_target >= _SURE_OF_TARGET)
+        return unread | (rings.confidence >= _CERTAIN)
 
     def _targets(self, rings: Aligned, look: _Look) -> list[Target]:
-        """Return the targets of the readings that are sure enough."""
+        """Return the targets of the readings that are sure enough, with their likeliest IDs."""
         rings = rings.select(self._shown(rings))
-        decoded = rings.confidence >= _CERTAIN
-        ids = np.where(decoded, rings.ids, UNDECODED)
-        certainty = np.where(decoded, rings.confidence, 0.0)
         return targets_from_frames(
-            *(rings.frames, rings.covariance, ids, rings.ids, certainty),
+            *(rings.frames, rings.covariance, rings.ids, rings.ids, rings.confidence),
             *(look.family.name, rings.edge_shift, look.polarity),
         )
 
@@ -175,10 +175,11 @@ class _Look:
     family: CircleFamily
     frames: np.ndarray  # (k, 3, 3), the likeliest first
     lights: Lights  # about those of the first that may be targets, of one edge at the most
+    prior: Prior  # before any target is read
 
 
 def _looks(
-    of_octaves: Sequence[Octave], kinds: Sequence[tuple[int, CircleFamily]]
+    of_octaves: Sequence[Octave], kinds: Sequence[tuple[int, CircleFamily]], prior: Prior
 ) -> dict[int, list[_Look]]:
     """Return what looks like targets of some colours and families, by the levels of octaves.
 
@@ -200,8 +201,11 @@ def _looks(
         for of in _first_lights([it.pyramid for it in of_octaves[part]], frames[part])
     ]
     return {
-        octave.level: [_Look(*it) for it in zip(*zip(*kinds, strict=True), *of, strict=True)]
-        for octave, *of in zip(of_octaves, frames, lights, strict=True)
+        octave.level: [
+            _Look(polarity, family, some, light, prior)
+            for (polarity, family), some, light in zip(kinds, own, lit_by, strict=True)
+        ]
+        for octave, own, lit_by in zip(of_octaves, frames, lights, strict=True)
     }
 
 
@@ -269,14 +273,14 @@ def _identified(gray: np.ndarray, look: _Look) -> tuple[Aligned, np.ndarray]:
     likely = again.select(again.of_target >= _SURE_OF_TARGET)
     if not len(likely.ids):
         return possible, gray
-    camera = Prior.of_camera(likely)
+    camera = look.prior.of_camera(likely)
     # Where one edge of light leaves no doubt, others are not looked for.
     sure = (possible.confidence >= _SURE) & (again.of_target >= _SURE)
     told = replace(again, margin=possible.margin).select(sure)
     again = identify(light, frames[_alone(frames, told.frames)], polarity, family, camera)
     rings = _best(_renewed(rings, Aligned.joined([told, again])), camera)
     sure = rings.of_target >= _SURE_OF_TARGET
-    prior = Prior.after(rings.select(sure & (rings.confidence >= _PROBABLE)))
+    prior = look.prior.after(rings.select(sure & (rings.confidence >= _PROBABLE)))
     if prior == camera:
         return rings, light
     rings = _best(rings, prior)
@@ -293,7 +297,7 @@ def _first_readings(gray: np.ndarray, look: _Look) -> tuple[Aligned, int]:
     Those that are most like rings come first, and with them the targets. Where none of so many in
     a row may be one, the others are texture.
     """
-    kind = look.polarity, look.family
+    kind = look.polarity, look.family, look.prior
     found, count = [identify_in(gray, look.lights, *kind, most=1)], _IN_A_ROW
     while (found[-1].of_target >= _POSSIBLE).any() and count < len(look.frames):
         some = look.frames[count : count + _IN_A_ROW]

@@ -195,7 +195,7 @@ class _Scene:
 
     def _told(self, rings: Aligned) -> tuple[_Scene, float]:
         """Return what targets tell, and the usual error of gray values."""
-        usual = replace(self.usual, camera=Prior.of_camera(self._aligned(rings, Prior())[0]))
+        usual = replace(self.usual, camera=Prior().of_camera(self._aligned(rings, Prior())[0]))
         scene = replace(self, usual=usual)
         fits = list(scene.fits(rings).values())
         if not fits:

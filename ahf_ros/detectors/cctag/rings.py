@@ -36,6 +36,7 @@ from ahf_ros.detectors.cctag.templates import (
     templates,
     two_discs,
 )
+from ahf_ros.detectors.expected import against
 from ahf_ros.features import frame
 from ahf_ros.features.array_record import ArrayRecord
 from ahf_ros.features.logistic import logistic
@@ -91,6 +92,8 @@ _OF_ID = np.array([-1.4, 1.2])  # of one, margin
 class Prior:
     """What is known of the edges of an image: growth of ink, px, blur, px, and sharpening.
 
+    `expected` are IDs that are likely to be there. Empty: all IDs are equally likely.
+
     The deviations are standard deviations, px, of ln of the blur, which is that of the image with
     that of pixels and of interpolation, and of the sharpening, the amount of an unsharp mask.
     """
@@ -99,12 +102,14 @@ class Prior:
     blur: float = 0.85
     sharpening: float = 0.0
     deviations: tuple[float, float, float] = (0.5, 0.35, 0.35)
+    expected: frozenset[int] = frozenset()
 
     def cost(self, rings: Aligned, size: np.ndarray) -> np.ndarray:
         """Return what is taken from ln of the odds of rings of a size, px, shape (k,)."""
         away = self.away(rings.shift, rings.blur, rings.sharpening) / self.deviations
         independent = size * np.ptp(PROFILE) / _INDEPENDENT
-        return (independent * rings.known * rings.left + (away**2).sum(axis=1)) / 2
+        left = independent * rings.known * rings.left + (away**2).sum(axis=1)
+        return left / 2 + against(rings.ids, self.expected)
 
     def away(self, shift: np.ndarray, blur: np.ndarray, sharpening: np.ndarray) -> np.ndarray:
         """Return how far edges are from what is known, in the units of deviations, (k, 3)."""
@@ -130,29 +135,30 @@ class Prior:
             for shift, blur, (more, clipped) in tried
         )
 
-    @staticmethod
-    def of_camera(rings: Aligned) -> Prior:
+    def of_camera(self, rings: Aligned) -> Prior:
         """Return what likely targets tell of the camera of an image."""
         if len(rings.ids) < _ENOUGH:
-            return Prior()
+            return Prior(expected=self.expected)
         usual = Prior().deviations[:2]
         return Prior(
-            sharpening=float(np.median(rings.sharpening)), deviations=(*usual, _OF_CAMERA)
+            sharpening=float(np.median(rings.sharpening)),
+            deviations=(*usual, _OF_CAMERA),
+            expected=self.expected,
         )
 
-    @staticmethod
-    def after(rings: Aligned) -> Prior:
+    def after(self, rings: Aligned) -> Prior:
         """Return what certain targets tell of the others."""
         count = len(rings.ids)
         if count < _ENOUGH:
-            return Prior()
+            return Prior(expected=self.expected)
         edges = np.stack([rings.shift, np.log(rings.blur), rings.sharpening], axis=1)
         usual = np.median(edges, axis=0)
         spread = NORMAL * np.median(np.abs(edges - usual), axis=0)
         variance = (count * spread**2 + _ENOUGH * np.square(_OF_IMAGE)) / (count + _ENOUGH)
         shift, blur, sharpening = usual.tolist()
         of_shift, of_blur, of_sharpening = np.sqrt(variance).tolist()
-        return Prior(shift, math.exp(blur), sharpening, (of_shift, of_blur, of_sharpening))
+        deviations = of_shift, of_blur, of_sharpening
+        return Prior(shift, math.exp(blur), sharpening, deviations, self.expected)
 
 
 _USUAL = Prior()

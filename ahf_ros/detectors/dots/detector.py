@@ -14,10 +14,10 @@ import numpy as np
 
 from ahf_ros.blas import one_blas_thread
 from ahf_ros.codes.dots import DotFamily
-from ahf_ros.detectors.claims import best_targets
+from ahf_ros.detectors.claims import reported
 from ahf_ros.detectors.contract import DetectorSettings, FamilyDetector, moved_targets
 from ahf_ros.detectors.dots.discs import judged, small_discs, voted_discs, whole_discs
-from ahf_ros.detectors.dots.rings import CERTAIN, Rings, fit_targets, read_discs, report
+from ahf_ros.detectors.dots.rings import CERTAIN, Rings, fit_targets, likely_targets, read_discs
 from ahf_ros.features.ellipse_targets import ellipse_fields
 from ahf_ros.features.frame import affine_frames, ellipse_axes
 from ahf_ros.features.large_targets import targets_of_octaves
@@ -50,7 +50,10 @@ class DotsDetector(FamilyDetector):
     def search(self, pyramid: ImagePyramid) -> list[Target]:
         """Identify the targets of one image; see `Searching`."""
         found = targets_of_octaves(pyramid, self.settings.radii, self._identify, self.refine)
-        return sorted_targets(best_targets(found, self.design.border_radius))
+        everything, reach = self.settings.report_undecoded, self.design.border_radius
+        return sorted_targets(
+            reported(found, reach, CERTAIN, everything=everything, contested=self.contested)
+        )
 
     @one_blas_thread()
     def refine(self, image: np.ndarray, targets: Sequence[Target]) -> list[Target]:
@@ -77,7 +80,7 @@ class DotsDetector(FamilyDetector):
             for target, change, place in zip(
                 dotted,
                 changes,
-                ellipse_fields(fit.frames, fit.covariance, fit.edge_shift),
+                ellipse_fields(fit.frames, fit.covariance, fit.growth),
                 strict=True,
             )
         ]
@@ -88,17 +91,22 @@ class DotsDetector(FamilyDetector):
         low, high = octave.radii
         settings = replace(self.settings, min_radius=low, max_radius=high)
         code = self.design
-        rings = find_rings(octave.pyramid, settings, code)
-        return report(rings, settings, code) if len(rings.words) else []
+        rings = find_rings(octave.pyramid, settings, code, self.expected)
+        return likely_targets(rings, settings, code) if len(rings.words) else []
 
 
-def find_rings(pyramid: ImagePyramid, settings: DetectorSettings, code: DotFamily) -> Rings:
+def find_rings(
+    pyramid: ImagePyramid,
+    settings: DetectorSettings,
+    code: DotFamily,
+    expected: frozenset[int] = frozenset(),
+) -> Rings:
     """Return all rings of dots that an image may show, before any decision."""
     found: list[Rings] = []
     known = np.zeros((0, 3, 3))
     for search in (whole_discs, voted_discs, small_discs):
         discs = judged(pyramid, search(pyramid, settings, code, known), known, code)
-        rings = read_discs(pyramid, discs, code)
+        rings = read_discs(pyramid, discs, code, expected)
         known = np.concatenate([known, rings.frames[rings.of_word >= CERTAIN]])
         found.append(rings)
     return Rings.joined(found)

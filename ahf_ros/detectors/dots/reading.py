@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ahf_ros.codes.cyclic import mirrored_words, rotated_words
 from ahf_ros.codes.dots import DotFamily
 from ahf_ros.detectors.dots.discs import border_steps
+from ahf_ros.detectors.expected import UNEXPECTED
 from ahf_ros.features.array_record import ArrayRecord
 from ahf_ros.features.circle_fit import Fit
 from ahf_ros.features.dot_evidence import PIXELS_ASIDE, circle_sides, dot_evidence
@@ -107,6 +109,31 @@ def read_rings(log: np.ndarray, fit: Fit, code: DotFamily) -> Readings:
         seen=border_steps(log, fit.frames, polarity, code, np.ones(1))[:, 0],
         height=highest / faintest,
         inside=inside,
+    )
+
+
+def expecting(readings: Readings, code: DotFamily, expected: frozenset[int]) -> Readings:
+    """Return readings once some IDs are likely to be there.
+
+    One of these takes the place of a word that is not much likelier. Others must be wrong at two
+    places to be one of them, so that any place of an expected word is surer.
+    """
+    own = code.words[np.isin(code.numbers, sorted(expected))]
+    own = np.concatenate([own, mirrored_words(own, code.bits)])
+    words = np.unique([rotated_words(own, turn, code.bits) for turn in range(code.bits)])
+    if not words.size:
+        return readings
+    marked = (words[:, None] >> np.arange(code.bits) & 1) > 0
+    lost = np.where(marked, -np.minimum(readings.evidence[:, None], 0), 0.0).sum(axis=2)
+    lost += np.where(marked, 0.0, np.maximum(readings.evidence[:, None], 0)).sum(axis=2)
+    best = lost.argmin(axis=1)
+    likely = lost[np.arange(len(best)), best] <= UNEXPECTED
+    signs = np.where(marked[best], 1, -1)
+    evidence = signs * np.maximum(signs * readings.evidence + UNEXPECTED, 0.0)
+    return replace(
+        readings,
+        words=np.where(likely, words[best], readings.words),
+        evidence=np.where(likely[:, None], evidence, readings.evidence),
     )
 
 

@@ -17,9 +17,9 @@ from typing import Any
 import numpy as np
 
 from ahf_ros.codes.dots import DotFamily
-from ahf_ros.detectors.claims import best_targets
+from ahf_ros.detectors.claims import best_of_places
 from ahf_ros.detectors.contract import DetectorSettings
-from ahf_ros.detectors.dots.reading import Readings, dot_points, read_rings
+from ahf_ros.detectors.dots.reading import Readings, dot_points, expecting, read_rings
 from ahf_ros.features.array_record import ArrayRecord
 from ahf_ros.features.circle_fit import Fit, fit_circles_of_any_blur
 from ahf_ros.features.circles import Circles
@@ -79,7 +79,7 @@ class Rings(ArrayRecord):
     phase : ndarray of float64, shape (k,)
         Direction of that place in the frame, rad clockwise from +x.
     edge_shift : ndarray of float64, shape (k,)
-        Of the edges of disc and border, as in `Fit`, px.
+        Growth of what is dark in light, by the edges of disc and border, px.
     radius : ndarray of float64, shape (k,)
         Of the small dots as seen, in radii of the disc.
     target_features, word_features : ndarray of float64, shape (k, n) and (k, m)
@@ -166,16 +166,26 @@ def word_probability(features: np.ndarray) -> np.ndarray:
     return np.minimum(logistic(features, _OF_WORD), not_misled)
 
 
-def read_discs(pyramid: ImagePyramid, discs: Dots, code: DotFamily) -> Rings:
-    """Return the rings of dots about discs, as far as they lie in the image."""
+def read_discs(
+    pyramid: ImagePyramid,
+    discs: Dots,
+    code: DotFamily,
+    expected: frozenset[int] = frozenset(),
+) -> Rings:
+    """Return the rings of dots about discs, as far as they lie in the image.
+
+    `expected` are IDs that are likely to be there. Empty: all IDs are equally likely.
+    """
     parts = [
-        _read_part(pyramid, discs.select(np.s_[start : start + _PART]), code)
+        _read_part(pyramid, discs.select(np.s_[start : start + _PART]), code, expected)
         for start in range(0, len(discs.frames), _PART)
     ]
     return Rings.joined([NO_RINGS, *parts])
 
 
-def _read_part(pyramid: ImagePyramid, discs: Dots, code: DotFamily) -> Rings:
+def _read_part(
+    pyramid: ImagePyramid, discs: Dots, code: DotFamily, expected: frozenset[int]
+) -> Rings:
     fit = fit_targets(pyramid.gray, discs.frames, discs.polarity, code)
     fit = fit.select((fit.share >= _PLAUSIBLE) & (fit.contrast <= _MAXIMUM_CONTRAST))
     readings = read_rings(pyramid.logs[0], fit, code)
@@ -183,49 +193,54 @@ def _read_part(pyramid: ImagePyramid, discs: Dots, code: DotFamily) -> Rings:
     missing = fit.share - readings.seen - _OF_BLUR * fit.blur / fit.size
     likely = (missing <= _MISSING) & (readings.between <= _BETWEEN) & readings.inside
     fit, readings = fit.select(likely), readings.select(likely)
+    if expected:
+        readings = expecting(readings, code, expected)
     return Rings(
         frames=fit.frames,
         covariance=fit.covariance,
         polarity=fit.polarity,
         words=readings.words,
         phase=readings.phase,
-        edge_shift=fit.edge_shift,
+        edge_shift=fit.growth,
         radius=readings.radius,
         target_features=target_features(readings, fit),
         word_features=word_features(readings, fit),
     )
 
 
-def report(rings: Rings, settings: DetectorSettings, code: DotFamily) -> list[DottedTarget]:
-    """Return one target for each place and each ID, the most certain one."""
-    major = ellipse_axes(rings.frames)[0]
+def likely_targets(
+    rings: Rings, settings: DetectorSettings, code: DotFamily
+) -> list[DottedTarget]:
+    """Return the targets whose words are certain, or all that there are if these are reported.
+
+    Each has its likeliest ID. There is one in each place.
+    """
+    shown = (rings.of_word >= CERTAIN) & (code.ids(rings.words) > 0)
+    shown |= settings.report_undecoded & (rings.whole | (rings.of_target >= CERTAIN))
+    shown &= settings.of_size(ellipse_axes(rings.frames)[0])
+    return best_of_places(_targets(rings.select(shown), code), code.border_radius)
+
+
+def _targets(rings: Rings, code: DotFamily) -> list[DottedTarget]:
     ids = code.ids(rings.words)
-    decoded = (rings.of_word >= CERTAIN) & (ids > 0)
-    shown = decoded | (settings.report_undecoded & (rings.whole | (rings.of_target >= CERTAIN)))
-    which = np.flatnonzero(shown & settings.of_size(major))
-    targets = _targets(rings.select(which), np.where(decoded, ids, UNDECODED)[which], code)
-    return best_targets(targets, code.border_radius)
-
-
-def _targets(rings: Rings, ids: np.ndarray, code: DotFamily) -> list[DottedTarget]:
-    decoded = ids != UNDECODED
+    valid = ids > 0
     places = ellipse_fields(rings.frames, rings.covariance, rings.edge_shift)
-    codes = np.where(decoded, code.canonical(rings.words), 0).tolist()
-    certainty = np.where(decoded, rings.of_word, 0.0).tolist()
-    words = np.where(decoded, rings.words, 0).tolist()
+    codes = np.where(valid, code.canonical(rings.words), 0).tolist()
+    certainty = np.where(valid, rings.of_word, 0.0).tolist()
+    words = np.where(valid, rings.words, 0).tolist()
     return [
         DottedTarget(
             id=identifier,
             code=of_code,
             confidence=sure,
             polarity=sign,
-            family='' if identifier == UNDECODED else code.name,
+            family=code.name,
             dots=_ellipses(frame, word, phase, radius, code),
             template_dots=2,
             **place,
         )
         for identifier, of_code, sure, sign, frame, word, phase, radius, place in zip(
-            ids.tolist(),
+            np.where(valid, ids, UNDECODED).tolist(),
             codes,
             certainty,
             rings.polarity.tolist(),

@@ -18,13 +18,16 @@ import numpy as np
 
 from ahf_ros.blas import one_blas_thread
 from ahf_ros.codes.gsi import PointFamily
-from ahf_ros.detectors.claims import best_targets
+from ahf_ros.detectors.claims import reported
 from ahf_ros.detectors.contract import DetectorSettings, FamilyDetector, moved_targets
 from ahf_ros.detectors.gsi.evidence import find_evidence, likely_templates, read_codes
 from ahf_ros.detectors.gsi.grouping import FEW, Templates, find_templates
 from ahf_ros.detectors.gsi.hypotheses import (
+    CERTAIN,
     NO_HYPOTHESES,
     OBVIOUS,
+    POSSIBLE,
+    SAME,
     Hypotheses,
     confidence_features,
     inside,
@@ -39,6 +42,7 @@ from ahf_ros.detectors.gsi.refinement import (
     place_targets,
     resized,
 )
+from ahf_ros.detectors.undecoded import undecoded
 from ahf_ros.features import frame
 from ahf_ros.features.dot_search import voted_dots, whole_dots
 from ahf_ros.features.dots import Dots, distinct
@@ -78,16 +82,20 @@ class GsiDetector(FamilyDetector):
         """Identify the targets of one image; see `Searching`."""
         found = targets_of_octaves(pyramid, self.settings.radii, self._identify, self.refine)
         single = [target for target in found if target.id == UNDECODED]
-        decoded = [target for target in found if target.id != UNDECODED]
-        return sorted_targets([*best_targets(decoded), *single])
+        coded = [target for target in found if target.id != UNDECODED]
+        everything, code = self.settings.report_undecoded, self.design
+        reach = SAME * code.reach / float(code.template_radii[code.reference])
+        coded = reported(coded, reach, CERTAIN, everything=everything, contested=self.contested)
+        return sorted_targets([*coded, *map(undecoded, single)])
 
     def _identify(self, octave: Octave) -> list[Target]:
         """Return the targets of an octave, in its pixels."""
         low, high = octave.radii
         settings = replace(self.settings, min_radius=low, max_radius=high)
         code = self.design
-        hypotheses, dots = find_hypotheses(octave.pyramid, settings, code)
-        targets = report(hypotheses, code)
+        hypotheses, dots = find_hypotheses(octave.pyramid, settings, code, self.expected)
+        minimum = POSSIBLE if settings.report_undecoded else CERTAIN
+        targets: list[Target] = [*likely_targets(hypotheses, code, minimum)]
         if settings.report_undecoded:
             targets += uncoded(octave.pyramid.gray, dots, targets, settings)
         return targets
@@ -119,7 +127,10 @@ class GsiDetector(FamilyDetector):
 
 
 def find_hypotheses(
-    pyramid: ImagePyramid, settings: DetectorSettings, code: PointFamily
+    pyramid: ImagePyramid,
+    settings: DetectorSettings,
+    code: PointFamily,
+    expected: frozenset[int] = frozenset(),
 ) -> tuple[Hypotheses, Dots]:
     """Return the groups of dots that may be targets, and all dots outside of certain targets.
 
@@ -128,7 +139,7 @@ def find_hypotheses(
     """
     kind = (*settings.radii, settings.polarities)
     whole = resized(pyramid.gray, whole_dots(pyramid, *kind))
-    first = read_targets(pyramid, whole, code, NO_HYPOTHESES, obvious=True)
+    first = read_targets(pyramid, whole, code, NO_HYPOTHESES, expected, obvious=True)
     certain = first.select(resolve(first, code, OBVIOUS))
     places, radii = _printed(certain.words, code, certain.scale)
     rest, explained = np.ones(len(whole.frames), bool), []
@@ -137,7 +148,7 @@ def find_hypotheses(
         corners = frame.circle_outlines(frames, np.ones(len(frames))).reshape(-1, 2)
         explained.append(cv2.convexHull(corners.astype(np.float32))[:, 0])
     dots = resized(pyramid.gray, _with_others(pyramid, whole.select(rest), settings, explained))
-    return read_targets(pyramid, dots, code, certain, obvious=False), dots
+    return read_targets(pyramid, dots, code, certain, expected, obvious=False), dots
 
 
 def _with_others(
@@ -151,7 +162,13 @@ def _with_others(
 
 
 def read_targets(
-    pyramid: ImagePyramid, dots: Dots, code: PointFamily, known: Hypotheses, *, obvious: bool
+    pyramid: ImagePyramid,
+    dots: Dots,
+    code: PointFamily,
+    known: Hypotheses,
+    expected: frozenset[int] = frozenset(),
+    *,
+    obvious: bool,
 ) -> Hypotheses:
     """Return known hypotheses, and the groups of dots that may be targets, read as codes.
 
@@ -167,32 +184,42 @@ def read_targets(
         templates = find_templates(dots.select(which), code, obvious=obvious)
         if not len(templates.polarity):
             continue
-        known = Hypotheses.joined([known, _read(pyramid, templates, code, obvious=obvious)])
+        read = _read(pyramid, templates, code, expected, obvious=obvious)
+        known = Hypotheses.joined([known, read])
     return known
 
 
 def _read(
-    pyramid: ImagePyramid, templates: Templates, code: PointFamily, *, obvious: bool
+    pyramid: ImagePyramid,
+    templates: Templates,
+    code: PointFamily,
+    expected: frozenset[int],
+    *,
+    obvious: bool,
 ) -> Hypotheses:
     least = least_support(obvious=obvious)
     templates, evidence = likely_templates(pyramid.logs[0], templates, code, least)
     if not len(templates.polarity):
         return NO_HYPOTHESES
-    readings = read_codes(evidence, templates.scale, code)
+    readings = read_codes(evidence, templates.scale, code, expected)
     which = plausible(templates, readings, code, obvious=obvious)
     if not len(which):
         return NO_HYPOTHESES
     words = readings.words[which]
-    first = _placed(pyramid, templates.select(which), words, code)
+    first = _placed(pyramid, templates.select(which), words, code, expected)
     again = np.flatnonzero((first.words != words) & (first.support >= _PROMISING))
     if not len(again):
         return first
     found = first.select(again)
-    return first.replaced(again, _placed(pyramid, found, found.words, code))
+    return first.replaced(again, _placed(pyramid, found, found.words, code, expected))
 
 
 def _placed(
-    pyramid: ImagePyramid, groups: Templates | Hypotheses, words: np.ndarray, code: PointFamily
+    pyramid: ImagePyramid,
+    groups: Templates | Hypotheses,
+    words: np.ndarray,
+    code: PointFamily,
+    expected: frozenset[int],
 ) -> Hypotheses:
     """Return hypotheses with homographies through all of their dots, read once more."""
     polarity = groups.polarity
@@ -201,20 +228,23 @@ def _placed(
     evidence = find_evidence(
         pyramid.logs[0], placement.homographies, polarity, placement.scale, code
     )
-    readings = read_codes(evidence, placement.scale, code)
+    readings = read_codes(evidence, placement.scale, code, expected)
     return Hypotheses(
         homographies=placement.homographies,
         covariance=placement.covariance,
         polarity=polarity,
         scale=placement.scale,
+        growth=placement.growth,
         words=readings.words,
         features=confidence_features(placement, readings, code),
     )
 
 
-def report(hypotheses: Hypotheses, code: PointFamily) -> list[Target]:
-    """Return the targets whose codes are certain, each ID once."""
-    some = hypotheses.select(resolve(hypotheses, code))
+def likely_targets(
+    hypotheses: Hypotheses, code: PointFamily, minimum: float
+) -> list[DottedTarget]:
+    """Return the targets whose codes have a minimum of confidence, one in each place."""
+    some = hypotheses.select(resolve(hypotheses, code, minimum))
     return [
         DottedTarget(
             id=code.number(word) or 0,
@@ -272,16 +302,19 @@ def _printed(
 def _fields(
     placed: Placement | Hypotheses, words: np.ndarray, code: PointFamily
 ) -> list[dict[str, Any]]:
-    """Return the fields of targets that say where they and their dots are."""
+    """Return the fields of targets that say where they are, and where their dots are seen."""
     places, radii = _printed(words, code, placed.scale)
-    own = [code.reference]
-    references = local_frames(placed.homographies, places[:, own], radii[:, own])[:, 0]
+    reference = code.reference
+    as_printed = code.places[[reference]], code.radii[[reference]]
+    references = local_frames(placed.homographies, *as_printed)[:, 0]
     frames = dot_frames(placed.homographies, places, radii)
     axes = np.stack(frame.ellipse_axes(frames.reshape(-1, 3, 3)), axis=1)
     ellipses = np.concatenate([frames[..., :2, 2], axes.reshape(*radii.shape, 3)], axis=2)
     return [
         {**place, 'dots': tuple(map(tuple, of_target))}
         for place, of_target in zip(
-            ellipse_fields(references, placed.covariance), ellipses.tolist(), strict=True
+            ellipse_fields(references, placed.covariance, placed.growth),
+            ellipses.tolist(),
+            strict=True,
         )
     ]

@@ -12,6 +12,7 @@ from functools import lru_cache
 import numpy as np
 
 from ahf_ros.codes.gsi import PointFamily
+from ahf_ros.detectors.expected import against
 from ahf_ros.detectors.gsi.grouping import Templates
 from ahf_ros.features.array_record import ArrayRecord
 from ahf_ros.features.dot_evidence import circle_sides, dot_evidence, independent_rays
@@ -273,8 +274,13 @@ class Readings:
     weakest: np.ndarray
 
 
-def read_codes(evidence: Evidence, scale: np.ndarray, family: PointFamily) -> Readings:
-    """Return the codes that the evidence speaks for.
+def read_codes(
+    evidence: Evidence,
+    scale: np.ndarray,
+    family: PointFamily,
+    expected: frozenset[int] = frozenset(),
+) -> Readings:
+    """Return the codes that the evidence speaks for, of those whose IDs are `expected` if any are.
 
     `scale`, shape (k,), is the radius of the dots in that of the printed design. What is seen at
     places nearer to dots than two radii is these dots, and tells nothing new.
@@ -284,6 +290,8 @@ def read_codes(evidence: Evidence, scale: np.ndarray, family: PointFamily) -> Re
     template, positions = limited[:, :count], limited[:, count:]
     incidence = _incidence(family)
     scores = np.clip(evidence.ratio[:, count:], -_MAXIMUM_AGAINST, _MAXIMUM_OF_DOT) @ incidence.T
+    if expected:
+        scores = scores - against(family.numbers, expected)
     rows, best = np.arange(len(scores)), scores.argmax(axis=1)
     highest = scores[rows, best]
     scores[rows, best] = highest - _GREATEST_MARGIN
@@ -291,14 +299,14 @@ def read_codes(evidence: Evidence, scale: np.ndarray, family: PointFamily) -> Re
     marked = incidence[best] > 0
     empty = ~marked & ~_covered(marked, scale, family)
     of_dots = np.concatenate([template, np.where(marked, positions, _MAXIMUM_FOR)], axis=1)
-    against = np.where(empty, -positions, 0.0).sum(axis=1)
+    empty_places = np.where(empty, -positions, 0.0).sum(axis=1)
     dots = template.sum(axis=1) + np.where(marked, positions, 0.0).sum(axis=1)
     empty &= evidence.inside[:, count:]
     most = (count + marked.sum(axis=1)) * _MAXIMUM_FOR + empty.sum(axis=1) * _MAXIMUM_AGAINST
     return Readings(
         words=family.words[best],
         margin=margin,
-        support=(dots + against) / most,
+        support=(dots + empty_places) / most,
         weakest=np.sort(of_dots, axis=1)[:, 1],
     )
 

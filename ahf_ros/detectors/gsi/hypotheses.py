@@ -24,6 +24,8 @@ from ahf_ros.features.logistic import logistic, read_weights
 WEIGHTS = Path(__file__).with_name('fitted_weights.json')
 CERTAIN = 0.95  # confidence from which a target is reported
 OBVIOUS = 0.99  # confidence from which a target is not weighed against others in its place
+POSSIBLE = 0.1  # confidence from which a target is reported without its ID, where these are
+SAME = 0.4  # distance of the reference points of the same target in its reach
 
 _UNEVEN = (0.005, 0.05)  # difference of radii that counts as 1, in ln: of any dot, and in px
 _PERSPECTIVE = 0.08  # change of depth from the centre to the edge of a target, that counts as 1
@@ -36,7 +38,6 @@ _MISFIT = 0.1  # support that a misfit of 1 of the template costs in the order o
 _EQUAL = 1.0  # distance of the reference points of equal hypotheses, dot radii
 _APART = 0.8  # distance of the reference points of different targets, in their reach
 _CLEARLY = 0.12  # support by which the better one of two groups that lie closer is better
-_SAME = 0.4  # distance of the reference points of the same target in its reach
 
 (_OF_TARGET,) = read_weights(WEIGHTS, 'gsi_confidence', 'weights')
 
@@ -53,6 +54,8 @@ class Hypotheses(ArrayRecord):
     polarity : ndarray of int, shape (k,)
     scale : ndarray of float64, shape (k,)
         Radius of the dots in that of the printed design.
+    growth : ndarray of float64, shape (k,)
+        Growth of what is dark in light, px; NaN where it was not measured.
     words : ndarray of int64, shape (k,)
         Value of the code.
     features : ndarray of float64, shape (k, 7)
@@ -63,6 +66,7 @@ class Hypotheses(ArrayRecord):
     covariance: np.ndarray
     polarity: np.ndarray
     scale: np.ndarray
+    growth: np.ndarray
     words: np.ndarray
     features: np.ndarray
 
@@ -82,6 +86,7 @@ NO_HYPOTHESES = Hypotheses(
     covariance=np.zeros((0, 2, 2)),
     polarity=np.zeros(0, int),
     scale=np.zeros(0),
+    growth=np.zeros(0),
     words=np.zeros(0, int),
     features=np.zeros((0, len(_OF_TARGET) - 1)),
 )
@@ -150,17 +155,12 @@ def plausible(
 
 
 def resolve(hypotheses: Hypotheses, family: PointFamily, minimum: float = CERTAIN) -> np.ndarray:
-    """Return the indices of the certain hypotheses, of each place and each print the best one.
-
-    A print is a code in one polarity. They have at least the minimum of confidence.
-    """
+    """Return the indices of hypotheses with a minimum of confidence, the best of each place."""
     confidence = hypotheses.confidence
     order = np.argsort(-confidence, kind='stable')
     order = order[confidence[order] >= minimum]
-    units = reference_frames(hypotheses.homographies[order], family.reach * _SAME)
-    prints, near = hypotheses.words * hypotheses.polarity, _within_each(units[:, :2, 2], units)
-    prints = prints[order]
-    return order[owners(len(order), lambda it: near(it) | (prints == prints[it]))]
+    units = reference_frames(hypotheses.homographies[order], family.reach * SAME)
+    return order[owners(len(order), _within_each(units[:, :2, 2], units))]
 
 
 def inside(points: np.ndarray, frames: np.ndarray) -> np.ndarray:

@@ -51,6 +51,8 @@ class Placement:
         Usual radius of the dots in that of the printed design.
     unevenness : ndarray of float64, shape (k,)
         Usual difference of a radius from that, in ln.
+    growth : ndarray of float64, shape (k,)
+        Growth of what is dark in light, by the radii of the dots, px.
     """
 
     homographies: np.ndarray
@@ -59,6 +61,7 @@ class Placement:
     misplacement: np.ndarray
     scale: np.ndarray
     unevenness: np.ndarray
+    growth: np.ndarray
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,12 +78,15 @@ class MeasuredDots:
         Whether there is an edge.
     near : ndarray of bool, shape (n,)
         Whether it is about where it should be.
+    growth : ndarray of float64, shape (n,)
+        Of what is dark in light, where there is an edge, if in gray values there was none, px.
     """
 
     frames: np.ndarray
     covariance: np.ndarray
     found: np.ndarray
     near: np.ndarray
+    growth: np.ndarray
 
 
 def measure_dots(gray: np.ndarray, frames: np.ndarray, polarity: np.ndarray) -> MeasuredDots:
@@ -89,6 +95,7 @@ def measure_dots(gray: np.ndarray, frames: np.ndarray, polarity: np.ndarray) -> 
     fitted = frames.copy()
     covariance = np.tile(_UNMEASURED**2 * np.eye(2), (len(frames), 1, 1))
     found, near = np.zeros((2, len(frames)), bool)
+    growth = np.zeros(len(frames))
     which = np.flatnonzero(minor >= _SIZES[0])
     reach = _REACHES[np.searchsorted(_SIZES, minor[which], 'right') - 1, None]
     circles = dot_circles(polarity[which], _RAYS)
@@ -96,10 +103,13 @@ def measure_dots(gray: np.ndarray, frames: np.ndarray, polarity: np.ndarray) -> 
     moved = np.hypot(*(fit.frames[:, :2, 2] - frames[which, :2, 2]).T)
     good = fit.share >= ENOUGH
     found[which], fitted[which[good]] = good, fit.frames[good]
+    growth[which] = fit.growth
     good &= moved <= np.maximum(_MAXIMUM_MOVE, _MAXIMUM_MOVE_SHARE * minor[which])
     near[which] = good
     covariance[which[good]] = fit.covariance[good] + _MINIMUM_ERROR**2 * np.eye(2)
-    return MeasuredDots(frames=fitted, covariance=covariance, found=found, near=near)
+    return MeasuredDots(
+        frames=fitted, covariance=covariance, found=found, near=near, growth=growth
+    )
 
 
 def resized(gray: np.ndarray, dots: Dots) -> Dots:
@@ -170,6 +180,8 @@ def place_targets(
     distance = np.hypot(*np.moveaxis(fitted - shift - expected, 2, 0)) / usual_distance
     misplaced = np.sort(np.where(found, np.log1p(distance**2), 0.0), axis=1)[:, :-1]
     uneven = median(np.abs(growth - np.log(scale)[:, None]), measured)
+    of_dots = polarity[:, None] * implied.reshape(shape) * np.expm1(growth)
+    of_dots += dots.growth.reshape(shape)
     return Placement(
         homographies=fit.homographies,
         covariance=fit.covariance * excess[:, None, None],
@@ -177,6 +189,7 @@ def place_targets(
         misplacement=misplaced.sum(axis=1),
         scale=scale,
         unevenness=uneven,
+        growth=np.where(found.any(axis=1), median(of_dots, found), np.nan),
     )
 
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ahf_ros.detectors.claims import Rivals, leading, owners
+from ahf_ros.detectors.claims import SURER, Rivals, leading, owners, sole_owners
 from ahf_ros.detectors.ring.confidence import COVERED
 from ahf_ros.detectors.ring.decoding import CLEAR
 from ahf_ros.detectors.ring.hypotheses import Hypotheses
@@ -21,8 +21,6 @@ _CODED = 5.0  # odds of words against arcs of any length, before any is read
 _OVERLAP = 0.92  # of the radii of two targets, at which the paper of one hides marks of the other
 _SHEAR = 0.5  # ln of axes, by which a shape differs from those of all targets beside it
 _ODD = 10.0  # odds against a target in another shape than those beside it
-_BEYOND_DOUBT = 20.0  # times as likely right as wrong, from which none is surer of its ID
-_SURER = 3.0  # times as sure of its word as of what lies below it, or has its ID elsewhere
 
 
 def among_others(hypotheses: Hypotheses) -> Hypotheses:
@@ -97,10 +95,8 @@ def resolve(hypotheses: Hypotheses, ids: np.ndarray) -> tuple[np.ndarray, np.nda
     kept = owners(len(ids), on_it)
     certain = kept & leading(marked, hypotheses.certain, against, _CLEARLY, CLEAR)
     sure = 1 / (1 - hypotheses.confidence + np.finfo(float).eps)
-    certain = leading(sure, certain, overlapping(hypotheses), _SURER)
-    # One of two that have an ID is wrong, unless it was printed twice: both are then beyond doubt.
-    sure = np.minimum(sure, _BEYOND_DOUBT)
-    return kept, leading(sure, certain, lambda index: ids == ids[index], _SURER)
+    certain = leading(sure, certain, overlapping(hypotheses), SURER)
+    return kept, sole_owners(hypotheses.confidence, certain, lambda index: ids == ids[index])
 
 
 def on_targets(hypotheses: Hypotheses, certain: np.ndarray) -> Rivals:

@@ -8,14 +8,14 @@ together to a projective frame, whose origin is the image of the target's physic
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
 
 from ahf_ros.blas import one_blas_thread
 from ahf_ros.codes.ring import Family
-from ahf_ros.detectors.contract import DetectorSettings
+from ahf_ros.detectors.contract import DetectorSettings, FamilyDetector
 from ahf_ros.detectors.ring.bands import with_measured_bands
 from ahf_ros.detectors.ring.choice import choose_families, further_families
 from ahf_ros.detectors.ring.contests import among_others, resolve
@@ -38,51 +38,30 @@ from ahf_ros.detectors.ring.proposals import (
     with_rims,
 )
 from ahf_ros.detectors.ring.refinement import refine_centres
+from ahf_ros.detectors.undecoded import undecoded
 from ahf_ros.features import frame
 from ahf_ros.features.circle_fit import NO_FITS, Fit
 from ahf_ros.features.ellipse_targets import targets_from_frames
 from ahf_ros.features.pyramid import ImagePyramid, Octave, image_pyramid, octaves
 from ahf_ros.imaging.faint import faint_parts
 from ahf_ros.imaging.image import as_gray, check_image
-from ahf_ros.target import UNDECODED, Target, UndecodedTarget, sorted_targets
+from ahf_ros.target import Target, sorted_targets
 
 _PART = 128  # dots of one colour that are read at a time
 _IN_PLACE, _EXACT = 0.6, 0.5  # edges of a dot: least share of them, largest deviation, px
-_UNLIKELY = 0.02  # confidence of a word below which a dot counts as unread
 
 
 @dataclass(frozen=True, slots=True)
-class RingDetector:
-    """Identify ring targets (Schneider type) of one family or of several.
+class RingDetector(FamilyDetector):
+    """Identify ring targets (Schneider type) of one family or of several."""
 
-    Attributes
-    ----------
-    settings : DetectorSettings
-    expected : frozenset of int
-        IDs that are likely to be there. Empty: all IDs are equally likely.
-    contested : bool
-        Whether targets whose ID others have, too, are among the results, undecoded.
-    """
-
-    settings: DetectorSettings
-    expected: frozenset[int] = frozenset()
-    contested: bool = False
-    contrast: ClassVar[int] = 1  # see `Searching`
+    name: ClassVar[str] = 'ring'
+    patience: ClassVar[int] = 2
 
     @property
-    def name(self) -> str:
-        """Name in the registry."""
-        return 'ring'
-
-    @property
-    def patience(self) -> int:
-        """Filters tried in vain after which a search ends; see `EarlyStopping`."""
-        return 2
-
-    @property
-    def family(self) -> str:
-        """Family of the codes, or several as the settings list them."""
-        return self.settings.family
+    def design(self) -> tuple[Family, ...]:
+        """Printed designs of the families."""
+        return self.settings.codes(Family)
 
     def __call__(self, image: np.ndarray) -> list[Target]:
         """Identify the targets of one image; see `Detector`."""
@@ -103,16 +82,8 @@ class RingDetector:
     @one_blas_thread()
     def refine(self, image: np.ndarray, targets: Sequence[Target]) -> list[Target]:
         """Return targets with their centres in an image; see `refine_centres`."""
-        families = self.settings.codes(Family)
-        return refine_centres(image, targets, families, self.settings.polarities, self.expected)
-
-    def expecting(self, ids: frozenset[int]) -> RingDetector:
-        """Return a detector that knows which IDs are likely; see `Expecting`."""
-        return replace(self, expected=ids)
-
-    def contesting(self) -> RingDetector:
-        """Return a detector that also returns targets that share an ID; see `Contesting`."""
-        return replace(self, contested=True)
+        polarities = self.settings.polarities
+        return refine_centres(image, targets, self.design, polarities, self.expected)
 
 
 def find_hypotheses(
@@ -344,21 +315,12 @@ def report(
     kept, certain = resolve(hypotheses, keys)
     if not settings.report_undecoded:
         kept = kept & hypotheses.certain if contested else certain
-    likely, ids = ids[kept], np.where(certain, ids, UNDECODED)
     some = hypotheses.select(kept)
     columns = (some.frames, some.covariance, ids[kept], codes[kept], some.confidence)
-    targets = targets_from_frames(*columns, names[kept], some.shift, some.polarity)
-    rows = zip(targets, some.certain.tolist(), names[kept].tolist(), likely.tolist(), strict=True)
-    return sorted_targets(_explained(*row) for row in rows)
-
-
-def _explained(target: Target, certain: bool, likely_family: str, likely_id: int) -> Target:
-    """Return a target with its likeliest word, and the reason if it is not decoded."""
-    if target.id != UNDECODED:
-        return target
-    if not certain and target.confidence < _UNLIKELY:
-        return UndecodedTarget(**asdict(target), reason='unread')
-    reason = 'contested' if certain else 'uncertain'
-    return UndecodedTarget(
-        **asdict(target), reason=reason, likely_id=likely_id, likely_family=likely_family
+    targets = targets_from_frames(*columns, names[kept], some.print_growth, some.polarity)
+    return sorted_targets(
+        target if is_certain else undecoded(target, contested=is_sure)
+        for target, is_certain, is_sure in zip(
+            targets, certain[kept].tolist(), some.certain.tolist(), strict=True
+        )
     )

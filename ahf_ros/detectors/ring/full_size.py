@@ -63,6 +63,7 @@ def _measured(image: np.ndarray, read: Hypotheses, which: np.ndarray) -> Hypothe
             share=fit.share,
             blur=fit.blur,
             edge_shift=fit.edge_shift,
+            contrast=fit.contrast,
         )
         good = fit.share >= ENOUGH
         read = read.replaced(of_code[good], fitted.select(good))

@@ -11,6 +11,7 @@ from ahf_ros.detectors.ring.decoding import Words
 from ahf_ros.features import frame
 from ahf_ros.features.array_record import ArrayRecord
 from ahf_ros.features.circle_fit import Fit
+from ahf_ros.features.growth import growth_in_light
 
 CERTAIN = 0.75
 """Confidence from which words are reported."""
@@ -35,7 +36,9 @@ class Hypotheses(ArrayRecord):
     blur : ndarray of float64, shape (k,)
         Of the edges, standard deviation in px of the image that they were measured in.
     edge_shift : ndarray of float64, shape (k,)
-        By how much what is dark has grown on all edges, px of that image.
+        By how much dark gray values have grown on all edges, px of that image.
+    contrast : ndarray of float64, shape (k,)
+        Usual gray value of the dark side of edges over the bright side's.
     polarity : ndarray of int, shape (k,)
         1 for a dark target on bright ground, -1 for a bright one on dark.
     words : ndarray of int64, shape (k,)
@@ -58,6 +61,7 @@ class Hypotheses(ArrayRecord):
     deviation: np.ndarray
     blur: np.ndarray
     edge_shift: np.ndarray
+    contrast: np.ndarray
     polarity: np.ndarray
     words: np.ndarray
     starts: np.ndarray
@@ -82,9 +86,10 @@ class Hypotheses(ArrayRecord):
         return self.certain & (self.coded > _CLEAR)
 
     @property
-    def shift(self) -> np.ndarray:
-        """Shifts of edges where a word was read, NaN elsewhere, px, float64, shape (k,)."""
-        return np.where(self.words > 0, self.edge_shift, np.nan)
+    def print_growth(self) -> np.ndarray:
+        """Growth of what is dark in light, px, (k,); NaN where no word was read."""
+        shift = np.where(self.words > 0, self.edge_shift, np.nan)
+        return growth_in_light(shift, self.blur, self.contrast)
 
     @property
     def reach(self) -> np.ndarray:
@@ -108,6 +113,7 @@ class Hypotheses(ArrayRecord):
             deviation=fit.deviation / fit.size,
             blur=fit.blur,
             edge_shift=fit.edge_shift,
+            contrast=fit.contrast,
             polarity=fit.polarity,
             words=words.words,
             starts=words.starts,

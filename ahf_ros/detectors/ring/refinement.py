@@ -64,7 +64,7 @@ def refine_centres(
     moved = np.hypot(*(located.frames[:, :2, 2] - start[:, :2, 2]).T)
     reach = np.maximum(_MAXIMUM_MOVE, _MAXIMUM_MOVE_SHARE * frame.ellipse_axes(start)[1])
     good = (located.share >= ENOUGH) & (moved <= reach)
-    places = ellipse_fields(located.frames, located.covariance, located.shift)
+    places = ellipse_fields(located.frames, located.covariance, located.print_growth)
     return [
         replace(target, **place) if is_good else target
         for target, place, is_good in zip(targets, places, good, strict=True)

@@ -23,6 +23,7 @@ from ahf_ros.detectors.square.margins import decision_margins
 from ahf_ros.detectors.square.prints import lay_outlines, lay_prints
 from ahf_ros.detectors.square.quadrilaterals import find_quadrilaterals
 from ahf_ros.detectors.square.reading import MINIMUM_ODDS, read
+from ahf_ros.detectors.undecoded import undecoded
 from ahf_ros.features.frame import reduced
 from ahf_ros.features.pyramid import halved
 from ahf_ros.imaging.image import as_gray, check_image
@@ -79,7 +80,8 @@ class SquareDetector(FamilyDetector):
         gray = np.ascontiguousarray(as_gray(image).astype(np.uint8, copy=False))
         groups = self.design
         levels = max(0, int(log2(max(min(gray.shape) / _SMALLEST_HALF, 1))))
-        corners, readings = [np.zeros((0, 4, 2))], [np.zeros((0, 5))]
+        expected, everything = self.expected, self.settings.report_undecoded
+        corners, readings = [np.zeros((0, 4, 2))], [np.zeros((0, 6))]
         for level, half in enumerate(halved(gray, levels)):
             found = find_quadrilaterals(half)
             small = np.linalg.norm(found[:, 2] - found[:, 0], axis=1) < _SMALL
@@ -88,44 +90,26 @@ class SquareDetector(FamilyDetector):
             else:  # where contours do as well, unless light, a lens or enlargement spreads
                 small &= ~_are_read(_enlarged(found, level), corners, readings)
                 found = np.concatenate([found, lay_outlines(half, found[small])])
-            found, read_as = _read(half, found, groups)
+            found, read_as = _read(half, found, groups, expected, everything=everything)
             corners.append(_enlarged(found, level))
             readings.append(read_as)
         places, rows = np.concatenate(corners), np.concatenate(readings)
-        found, read_as = _read(gray, _laid(gray, places, rows, groups), groups)
+        found, read_as = _read(gray, _laid(gray, places, rows, groups), groups, expected)
         read_as[:, 3] -= _FITTED
         places, rows = np.concatenate([places, found]), np.concatenate([rows, read_as])
         sure = rows[:, 3] > MINIMUM_ODDS
-        places, rows = places[sure], rows[sure]
-        odds = _odds_together(rows, _one_place(places), groups)
+        doubtful = ~sure & (rows[:, 5] > 0) if everything else np.zeros(len(rows), bool)
+        together = _odds_together(rows[sure], _one_place(places[sure]), groups)
+        odds = np.concatenate([together, np.minimum(rows[doubtful, 3], MINIMUM_ODDS)])
+        places, rows = (np.concatenate([of[sure], of[doubtful]]) for of in (places, rows))
         order = np.argsort(-odds, kind='stable')
-        owning = owners(len(order), _one_place(places[order]))
-        chosen = order[owning & (odds[order] > MINIMUM_ODDS)]
-        if not len(chosen):
-            return []
-        which, numbers, borders, *_ = rows[chosen].T
-        families = [
-            next(name for name in group if len(words(name)) > numbers[which == index].max())
-            if index in which
-            else ''
-            for index, group in enumerate(groups)
-        ]
-        deviations = _DRAFT_DEVIATION * side_lengths(places[chosen]).mean(axis=1)
-        covariances = deviations[:, None, None] ** 2 * np.eye(2)
-        confidences = 1 / (1 + np.exp(-odds[chosen]))
-        fields = _places(places[chosen], covariances, np.full(len(chosen), np.nan))
+        order = order[owners(len(order), _one_place(places[order]))]
+        decoded = odds[order] > MINIMUM_ODDS
+        markers = _markers(places[order], rows[order], odds[order], decoded, groups)
         return sorted_targets(
-            SquareMarker(
-                id=int(number),
-                code=int(number),
-                family=families[int(index)],
-                confidence=confidence,
-                border=int(border),
-                **place,
-            )
-            for index, number, border, confidence, place in zip(
-                which, numbers, borders, confidences.tolist(), fields, strict=True
-            )
+            it if is_decoded else undecoded(it)
+            for it, is_decoded in zip(markers, decoded.tolist(), strict=True)
+            if is_decoded or everything
         )
 
     @one_blas_thread()
@@ -154,11 +138,46 @@ class SquareDetector(FamilyDetector):
         return refined
 
 
-def _read(gray: np.ndarray, corners: np.ndarray, groups: Groups) -> tuple[np.ndarray, np.ndarray]:
-    """Return the corners of readings, shape (k, 4, 2), and their columns, (k, 5)."""
-    found = read(gray, corners, groups)
+def _markers(
+    places: np.ndarray, rows: np.ndarray, odds: np.ndarray, decoded: np.ndarray, groups: Groups
+) -> list[SquareMarker]:
+    """Return readings as markers, of the smallest dictionary that has all that are decoded."""
+    which, numbers, borders = rows[:, :3].T.astype(int)
+    largest = [numbers[decoded & (which == index)].max(initial=0) for index in range(len(groups))]
+    deviations = _DRAFT_DEVIATION * side_lengths(places).mean(axis=1)
+    covariances = deviations[:, None, None] ** 2 * np.eye(2)
+    confidences = 1 / (1 + np.exp(-odds))
+    fields = _places(places, covariances, np.full(len(places), np.nan))
+    columns = (which, numbers, borders, confidences)
+    return [
+        SquareMarker(
+            id=number,
+            code=number,
+            family=next(
+                name for name in groups[index] if len(words(name)) > max(number, largest[index])
+            ),
+            confidence=confidence,
+            border=border,
+            **place,
+        )
+        for index, number, border, confidence, place in zip(
+            *(of.tolist() for of in columns), fields, strict=True
+        )
+    ]
+
+
+def _read(
+    gray: np.ndarray,
+    corners: np.ndarray,
+    groups: Groups,
+    expected: frozenset[int],
+    *,
+    everything: bool = False,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the corners of readings, shape (k, 4, 2), and their columns, (k, 6)."""
+    found = read(gray, corners, groups, expected, everything=everything)
     turned = (np.arange(4) - found.turn[:, None]) % 4
-    columns = (found.group, found.number, found.border, found.odds, found.others)
+    columns = (found.group, found.number, found.border, found.odds, found.others, found.whole)
     return corners[found.quadrilateral[:, None], turned], np.stack(columns, axis=1)
 
 
@@ -214,7 +233,7 @@ def _odds_together(readings: np.ndarray, one_place: Rivals, groups: Groups) -> n
     group reads the same places, the surer one is there, and of several markers of a group in one
     place, as by borders of one and two cells, one is.
     """
-    group, number, _, of_group, others = readings.T
+    group, number, _, of_group, others, _ = readings.T
     lead, odds = np.empty((2, len(readings)))
     for index, own in enumerate(of_group):
         near, alike = one_place(index), group == group[index]

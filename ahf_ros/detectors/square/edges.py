@@ -28,6 +28,7 @@ from ahf_ros.detectors.square.frames import (
 )
 from ahf_ros.features.edge_errors import common_slope, smooth_slopes, weigh_edges
 from ahf_ros.features.frame import project
+from ahf_ros.features.growth import growth_in_light
 from ahf_ros.features.profiles import (
     BLURS,
     USUAL_BLUR,
@@ -154,7 +155,8 @@ def _fitted(
     covariance = centre_covariance(frames, solution.normal, of_cells.swapaxes(1, 2))
     through = _THROUGH * (blur / cell) ** 4
     covariance += (through**2)[:, None, None] * np.eye(2)
-    return Places(project(frames, SQUARE), share, covariance, solution.unknowns[:, PLACE])
+    growth = growth_in_light(solution.unknowns[:, PLACE], blur, own.contrast)
+    return Places(project(frames, SQUARE), share, covariance, growth)
 
 
 def _measured(

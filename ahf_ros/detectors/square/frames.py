@@ -40,8 +40,8 @@ class Places(ArrayRecord):
     covariance : ndarray of float64, shape (k, 2, 2)
         Covariance of the centre, px^2.
     edge_shift : ndarray of float64, shape (k,)
-        Length by which dark areas are larger in the image than in the print, on every edge, px;
-        NaN where that was not measured. The corners are those without it.
+        Growth of what is dark in light, on every edge, px; NaN where that was not measured. The
+        corners are those without it.
     """
 
     corners: np.ndarray

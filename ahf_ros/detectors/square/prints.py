@@ -34,6 +34,7 @@ from ahf_ros.detectors.square.frames import (
     square_frames,
 )
 from ahf_ros.features.frame import project
+from ahf_ros.features.growth import growth_in_light
 from ahf_ros.features.normal import normal_integral
 from ahf_ros.features.profiles import USUAL_BLUR
 from ahf_ros.features.robust import NORMAL, geman_mcclure, geman_mcclure_gain
@@ -190,7 +191,8 @@ def _laid(
         if not active.size:
             break
     near = np.linalg.norm(laid - corners, axis=2).max(axis=1) < np.maximum(size / cells, _NEAR)
-    shift = levels[:, 6] / levels[:, 3] * size
+    contrast = (levels[:, 0] + levels[:, 3]) / np.maximum(levels[:, 0], 1)
+    shift = growth_in_light(levels[:, 6] / levels[:, 3] * size, blur * size, contrast)
     return Places(
         laid, np.where(near, share, 0.0), centre_covariance(frames, normals, sums), shift
     )

@@ -23,6 +23,7 @@ import cv2
 import numpy as np
 
 from ahf_ros.codes.square import borders, corner_counts, words
+from ahf_ros.detectors.expected import against as of_expected
 from ahf_ros.detectors.square.frames import side_lengths, square_frames
 from ahf_ros.detectors.square.shapes import corner_odds, parallel_odds
 from ahf_ros.features.frame import project
@@ -55,6 +56,7 @@ _DOUBT = 6.0  # logarithmic odds against a marker that nothing but a quadrilater
 _FIGURES = 7.0  # logarithmic odds of letters and the like against markers
 _POSSIBLE = -12.0  # minimum of these odds where all is as usual but a corner or the blur
 _CLEAR = -6.0  # maximum of the odds of other markers where these odds are low
+_WHOLE = -1.0  # logarithmic odds of the cells of a border, from which it is whole
 _PLAIN = 0.35  # logarithmic odds against a marker, for each edge less than random cells have
 
 _ERF = np.frompyfunc(erf, 1, 1)
@@ -74,14 +76,24 @@ class Readings:
     border: np.ndarray  # width of the border, cells
     odds: np.ndarray  # logarithmic, that it is a marker of the group, if the group is there
     others: np.ndarray  # logarithmic odds of other markers of the group against this one
+    whole: np.ndarray  # whether its border is one of a marker, whatever is inside
 
 
-def read(gray: np.ndarray, corners: np.ndarray, groups: Sequence[Sequence[str]]) -> Readings:
+def read(
+    gray: np.ndarray,
+    corners: np.ndarray,
+    groups: Sequence[Sequence[str]],
+    expected: frozenset[int] = frozenset(),
+    *,
+    everything: bool = False,
+) -> Readings:
     """Read quadrilaterals, shape (k, 4, 2), px, of an image of uint8 as markers of dictionaries.
 
-    A group has dictionaries that begin with the same markers, the smallest first.
+    A group has dictionaries that begin with the same markers, the smallest first. `expected` are
+    IDs that are likely to be there; empty: all IDs are equally likely. Those with a whole border
+    that are like none of the markers are among them if `everything` is asked for.
     """
-    found = [np.zeros((0, 7))]
+    found = [np.zeros((0, 8))]
     groups = groups if len(corners) else ()
     frames = square_frames(corners)
     bordered = np.flatnonzero(_dark_inside(gray, frames, _DEPTH))
@@ -98,7 +110,7 @@ def read(gray: np.ndarray, corners: np.ndarray, groups: Sequence[Sequence[str]])
         if not len(some):
             continue
         places = frames[some], corners[some], sizes[some]
-        evidence, against, square, which = _evidence(gray, *places, cells, border)
+        evidence, against, square, whole, which = _evidence(gray, *places, cells, border)
         which = some[which]
         square += parallel[which]
         for index, group in enumerate(groups):
@@ -107,11 +119,13 @@ def read(gray: np.ndarray, corners: np.ndarray, groups: Sequence[Sequence[str]])
             prints, prior, few, drawn = _table(tuple(group))
             odds = evidence @ prints
             odds -= prior
+            if expected:
+                odds -= np.repeat(of_expected(np.arange(len(prior) // 4), expected), 4)
             best = odds.argmax(axis=1)
             of_cells = odds[np.arange(len(best)), best] + against - _DOUBT - few[best]
             of_shape = square + drawn[best] - prior[best] - _FIGURES
             total = -np.logaddexp(-of_cells, -of_shape)
-            likely = np.flatnonzero(total > _POSSIBLE)
+            likely = np.flatnonzero((total > _POSSIBLE) | everything & whole)
             odds, best, total = odds[likely], best[likely], total[likely]
             # A turn of the same marker is no other: some are symmetric.
             number, turn = np.divmod(best, 4)
@@ -121,10 +135,20 @@ def read(gray: np.ndarray, corners: np.ndarray, groups: Sequence[Sequence[str]])
             second = odds.max(axis=1, initial=-np.inf)
             others = second + np.log(np.exp(odds - second[:, None]).sum(axis=1))
             alike = np.full((2, len(best)), [[index], [border]])
-            columns = (which[likely], alike[0], number, turn, alike[1], total, others)
+            columns = (
+                which[likely],
+                alike[0],
+                number,
+                turn,
+                alike[1],
+                total,
+                others,
+                whole[likely],
+            )
             found.append(np.stack(columns, axis=1))
     table = np.concatenate(found)
-    table = table[(table[:, 5] > MINIMUM_ODDS) | (table[:, 6] < _CLEAR)]
+    shown = (table[:, 5] > MINIMUM_ODDS) | (table[:, 6] < _CLEAR)
+    table = table[shown | everything & (table[:, 7] > 0)]
     which, group, number, turn, widths = table[:, :5].T.astype(int)
     return Readings(
         quadrilateral=which,
@@ -134,6 +158,7 @@ def read(gray: np.ndarray, corners: np.ndarray, groups: Sequence[Sequence[str]])
         border=widths,
         odds=table[:, 5],
         others=table[:, 6],
+        whole=table[:, 7] > 0,
     )
 
 
@@ -188,11 +213,12 @@ def _evidence(
     sizes: np.ndarray,
     cells: int,
     border: int,
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Return what the cells of quadrilaterals within a border say, and indices of these.
 
     It is by how much the logarithmic odds of a marker grow where a cell is paper, shape
-    (k, cells^2), what they are where all cells are ink, (k,), and those of square corners, (k,).
+    (k, cells^2), what they are where all cells are ink, (k,), those of square corners, (k,), and
+    whether the border is whole, bool, (k,).
     Those with small cells are there twice, once as in a sharp image, and those with large cells
     once by the darkest part of each, as where light has spread from paper over ink.
     """
@@ -241,7 +267,8 @@ def _evidence(
     depths = _CORNER * _cell_sizes(corners[tried[which]], side) / blurs[which, None]
     square = np.clip(corner_odds(bright, depths, _SHARPNESS), -_COVERED, _COVERED).sum(axis=1)
     rare = spreads[which]
-    return paper.astype(np.float32), inside - rare, square - rare, tried[which]
+    whole = (around > _WHOLE) & (square > 0)
+    return paper.astype(np.float32), inside - rare, square - rare, whole, tried[which]
 
 
 @dataclass(frozen=True, slots=True)
