@@ -32,7 +32,7 @@ DOUBTFUL: dict[str, dict[str, Any]] = {
     'cct12': {'dot_radius': 5.0, 'light': 'stripe', 'ambient': 0.1},
     'gsi': {'dot_radius': 2.5, 'light': 'lattice', 'ambient': 0.3},
     'dots': {'dot_radius': 5.0, 'light': 'lattice', 'ambient': 0.1},
-    'cctag3': {'dot_radius': 8.0, 'blur': 1.0},
+    'cctag3': {'dot_radius': 8.0, 'blur': 1.0, 'targets': 3},
     'aruco_4x4_50': STRIPES,
     'apriltag_36h11': STRIPES,
 }
@@ -42,7 +42,9 @@ EVERY = pytest.mark.parametrize('family', KINDS)
 @cache
 def scene(family: str, **changes: Any) -> Rendering:
     large = family.startswith(('cctag', 'aruco', 'apriltag'))
-    size = {'dot_radius': 24.0 if large else 8.0}
+    size: dict[str, Any] = {'dot_radius': 24.0 if large else 8.0}
+    if family == 'cctag3':  # whose light takes long to tell from rings
+        size |= {'width': 640, 'height': 480, 'targets': 3, 'dot_radius': 20.0}
     return render(SceneSettings(family=family, **{**PLAIN, **size, **changes}))
 
 
@@ -63,11 +65,12 @@ def damaged(shown: Rendering, victim: Target, family: str) -> np.ndarray:
 @EVERY
 @pytest.mark.parametrize('grown', [-0.3, 0.0, 0.6])
 def test_the_edge_shift_is_the_growth_of_ink_in_light(family: str, grown: float) -> None:
-    found = identify(scene(family, edge_shift=grown).image, family=family).targets
-    assert len(found) == 6
+    shown = scene(family, edge_shift=grown)
+    found = identify(shown.image, family=family).targets
+    assert len(found) == len(shown.targets)
     shifts = [it.edge_shift for it in found]
     assert np.median(shifts) == pytest.approx(grown, abs=0.06)
-    assert shifts == pytest.approx([grown] * 6, abs=0.2)
+    assert shifts == pytest.approx([grown] * len(found), abs=0.2)
 
 
 @EVERY
@@ -75,11 +78,11 @@ def test_size_and_direction_are_those_of_the_print(family: str) -> None:
     shown = scene(family, edge_shift=0.6, tilt=40.0)
     true = {it.id: it for it in shown.targets}
     found = identify(shown.image, family=family).targets
-    assert len(found) == 6
+    assert len(found) == len(true)
     for target in found:
         own = true[target.id]
-        assert target.semi_major == pytest.approx(own.semi_major, rel=0.03)
-        assert target.semi_minor == pytest.approx(own.semi_minor, rel=0.03)
+        assert target.semi_major == pytest.approx(own.semi_major, rel=0.04)
+        assert target.semi_minor == pytest.approx(own.semi_minor, rel=0.04)
         assert np.cos(2 * (target.angle - own.angle)) > 0.99
         assert (target.code, target.family) == (own.code, family)
 
@@ -87,12 +90,13 @@ def test_size_and_direction_are_those_of_the_print(family: str) -> None:
 @EVERY
 def test_what_is_not_decoded_says_why_and_is_reported_on_demand_alone(family: str) -> None:
     shown = scene(family)
-    victim = min(shown.targets, key=lambda it: np.hypot(it.x - 600, it.y - 450))
+    height, width = shown.image.shape
+    victim = min(shown.targets, key=lambda it: np.hypot(it.x - width / 2, it.y - height / 2))
     image = damaged(shown, victim, family)
     found = identify(image, family=family).targets
     assert {it.id for it in found} == {it.id for it in shown.targets} - {victim.id}
     every = identify(image, family=family, report_undecoded=True).targets
-    assert [it for it in every if it.id != UNDECODED] == list(found)
+    assert [it.key for it in every if it.id != UNDECODED] == [it.key for it in found]
     others = [it for it in every if it.id == UNDECODED]
     assert all(isinstance(it, UndecodedTarget) for it in others)
     reach = KINDS[family][0] * victim.semi_major
