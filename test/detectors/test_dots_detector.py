@@ -49,7 +49,7 @@ def test_edges_that_moved_and_dots_of_other_radii_are_read(
     tmp_path: Path, light: str, shift: float, radius: float
 ) -> None:
     path, pixels = design(tmp_path, 14.0, shift, radius)
-    own = {'family_file': path, 'dot_radius': pixels, 'radius_spread': 0.0, 'gamma': 1.0}
+    own = {'family_file': path, 'dot_radius': pixels, 'radius_spread': 0.0}
     shown = scene(**own, light=light, seed=6)
     found = find_rings(
         image_pyramid(shown.image, 60.0), DetectorSettings(family='dots'), dot_family()

@@ -57,6 +57,7 @@ from ahf_ros.target import UNDECODED, DottedTarget, Target, sorted_targets
 _MARGIN = 0.5  # about the dots of certain targets, dot radii
 _WHOLE_MARGIN = 0.4  # about a dot whose outline is whole, dot radii
 _PROMISING = 0.85  # support of a hypothesis with another code than before, to be placed again
+_MAXIMUM_GROWTH = 1.0  # of ink, beyond which dots are printed with another radius, px
 _MAXIMUM_MOVE = 1.0  # that the reference point is moved by a refinement, px, or dot radii
 
 
@@ -304,16 +305,17 @@ def _fields(
 ) -> list[dict[str, Any]]:
     """Return the fields of targets that say where they are, and where their dots are seen."""
     places, radii = _printed(words, code, placed.scale)
-    reference = code.reference
-    as_printed = code.places[[reference]], code.radii[[reference]]
-    references = local_frames(placed.homographies, *as_printed)[:, 0]
+    own = [code.reference]
+    references = local_frames(placed.homographies, places[:, own], radii[:, own])[:, 0]
+    # Dots may have another radius than the design says: their size is the one that is seen.
+    growth = np.where(np.abs(placed.growth) <= _MAXIMUM_GROWTH, placed.growth, np.nan)
     frames = dot_frames(placed.homographies, places, radii)
     axes = np.stack(frame.ellipse_axes(frames.reshape(-1, 3, 3)), axis=1)
     ellipses = np.concatenate([frames[..., :2, 2], axes.reshape(*radii.shape, 3)], axis=2)
     return [
         {**place, 'dots': tuple(map(tuple, of_target))}
         for place, of_target in zip(
-            ellipse_fields(references, placed.covariance, placed.growth),
+            ellipse_fields(references, placed.covariance, growth),
             ellipses.tolist(),
             strict=True,
         )
