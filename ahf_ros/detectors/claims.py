@@ -20,9 +20,7 @@ Rivals = Callable[[int], np.ndarray]
 The claim itself may be among them. The relation need not be mutual.
 """
 
-SURER = 3.0
-"""Times as sure of its word as a rival, from which a claim leads."""
-
+_SURER = 3.0  # times as sure of its word as a rival, from which a claim leads
 _BEYOND_DOUBT = 20.0  # times as likely right as wrong, from which none is surer of its ID
 
 _Target = TypeVar('_Target', bound=Target)
@@ -60,6 +58,11 @@ def leading(
     return ahead
 
 
+def surer(sure: np.ndarray, certain: np.ndarray, rivals: Rivals) -> np.ndarray:
+    """Return which certain claims, (k,), are much surer than all certain rivals."""
+    return leading(sure, certain, rivals, _SURER)
+
+
 def sole_owners(confidence: np.ndarray, certain: np.ndarray, alike: Rivals) -> np.ndarray:
     """Return which certain claims, (k,), are much surer of their ID than all others to the same.
 
@@ -67,7 +70,7 @@ def sole_owners(confidence: np.ndarray, certain: np.ndarray, alike: Rivals) -> n
     and none is the owner.
     """
     sure = np.minimum(1 / (1 - confidence + np.finfo(float).eps), _BEYOND_DOUBT)
-    return leading(sure, certain, alike, SURER)
+    return surer(sure, certain, alike)
 
 
 def best_targets(targets: Sequence[_Target], reach: float = 0.0) -> list[_Target]:

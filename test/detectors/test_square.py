@@ -10,6 +10,7 @@ from ahf_ros.codes import SQUARE_NAMES
 from ahf_ros.codes.square import marker, words
 from ahf_ros.detectors import Detector, create_detector
 from ahf_ros.evaluation import score
+from ahf_ros.imaging.image import GAMMA
 from ahf_ros.session import identify
 from ahf_ros.settling import evident
 from ahf_ros.synthetic.scene import Rendering
@@ -196,7 +197,8 @@ def test_markers_of_an_aprilgrid_touch_squares_and_have_wide_borders():
             grid[top : top + cells, left : left + cells] = 30
             grid[top + 2 : top + cells - 2, left + 2 : left + cells - 2][white] = 225
     image = cv2.resize(np.pad(grid, 3, constant_values=225), None, fx=7, fy=7, interpolation=0)
-    found = create_detector(family=family)(cv2.GaussianBlur(image, (0, 0), 1.0))
+    light = cv2.GaussianBlur((image / 255) ** GAMMA, (0, 0), 1.0)
+    found = create_detector(family=family)(np.uint8(255 * light ** (1 / GAMMA)))
     assert [it.id for it in found] == list(range(9))
     middle = 7 * (3 + gap + cells / 2) - 0.5
     rows, columns = np.divmod(np.arange(9), count)

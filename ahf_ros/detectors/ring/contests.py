@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ahf_ros.detectors.claims import SURER, Rivals, leading, owners, sole_owners
+from ahf_ros.detectors.claims import Rivals, leading, owners, sole_owners, surer
 from ahf_ros.detectors.ring.confidence import COVERED
 from ahf_ros.detectors.ring.decoding import CLEAR
 from ahf_ros.detectors.ring.hypotheses import Hypotheses
@@ -95,7 +95,7 @@ def resolve(hypotheses: Hypotheses, ids: np.ndarray) -> tuple[np.ndarray, np.nda
     kept = owners(len(ids), on_it)
     certain = kept & leading(marked, hypotheses.certain, against, _CLEARLY, CLEAR)
     sure = 1 / (1 - hypotheses.confidence + np.finfo(float).eps)
-    certain = leading(sure, certain, overlapping(hypotheses), SURER)
+    certain = surer(sure, certain, overlapping(hypotheses))
     return kept, sole_owners(hypotheses.confidence, certain, lambda index: ids == ids[index])
 
 
