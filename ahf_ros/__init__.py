@@ -10,22 +10,22 @@ from typing import TYPE_CHECKING, Any
 _MODULES = {
     'DETECTOR_NAMES': 'detectors',
     'FAMILY_NAMES': 'detectors',
-    'UNDECODED': 'target',
+    'UNDECODED': 'base.target',
     'AdaptiveSettings': 'filtering.settings',
     'Detector': 'detectors',
     'DetectorSettings': 'detectors',
-    'DottedTarget': 'target',
-    'FilterState': 'target',
-    'Identification': 'target',
+    'DottedTarget': 'base.target',
+    'FilterState': 'base.target',
+    'Identification': 'base.target',
     'IdentificationSettings': 'session_settings',
     'Identifier': 'filtering.identifier',
     'ImageStack': 'imaging.stack',
     'SceneSettings': 'synthetic.scene',
-    'SearchTrace': 'target',
-    'SquareMarker': 'target',
-    'Target': 'target',
-    'TrueTarget': 'target',
-    'UndecodedTarget': 'target',
+    'SearchTrace': 'base.target',
+    'SquareMarker': 'base.target',
+    'Target': 'base.target',
+    'TrueTarget': 'base.target',
+    'UndecodedTarget': 'base.target',
     'adjust': 'orientation.adjustment',
     'compare': 'orientation.congruence',
     'create_detector': 'detectors',
@@ -41,6 +41,15 @@ _MODULES = {
 }
 
 if TYPE_CHECKING:  # which takes what is imported `as` itself for public
+    from ahf_ros.base.target import UNDECODED as UNDECODED
+    from ahf_ros.base.target import DottedTarget as DottedTarget
+    from ahf_ros.base.target import FilterState as FilterState
+    from ahf_ros.base.target import Identification as Identification
+    from ahf_ros.base.target import SearchTrace as SearchTrace
+    from ahf_ros.base.target import SquareMarker as SquareMarker
+    from ahf_ros.base.target import Target as Target
+    from ahf_ros.base.target import TrueTarget as TrueTarget
+    from ahf_ros.base.target import UndecodedTarget as UndecodedTarget
     from ahf_ros.detectors import DETECTOR_NAMES as DETECTOR_NAMES
     from ahf_ros.detectors import FAMILY_NAMES as FAMILY_NAMES
     from ahf_ros.detectors import Detector as Detector
@@ -62,15 +71,6 @@ if TYPE_CHECKING:  # which takes what is imported `as` itself for public
     from ahf_ros.session_settings import IdentificationSettings as IdentificationSettings
     from ahf_ros.synthetic.scene import SceneSettings as SceneSettings
     from ahf_ros.synthetic.scene import render as render
-    from ahf_ros.target import UNDECODED as UNDECODED
-    from ahf_ros.target import DottedTarget as DottedTarget
-    from ahf_ros.target import FilterState as FilterState
-    from ahf_ros.target import Identification as Identification
-    from ahf_ros.target import SearchTrace as SearchTrace
-    from ahf_ros.target import SquareMarker as SquareMarker
-    from ahf_ros.target import Target as Target
-    from ahf_ros.target import TrueTarget as TrueTarget
-    from ahf_ros.target import UndecodedTarget as UndecodedTarget
 else:
     __all__ = list(_MODULES)
 
@@ -82,7 +82,7 @@ __path__ = extend_path(__path__, __name__)
 def __getattr__(name: str) -> Any:
     """Import a public name, see PEP 562."""
     if name == '__version__':
-        value = import_module(f'{__name__}.release').release()
+        value = import_module(f'{__name__}.base.release').release()
     elif name in _MODULES:
         value = getattr(import_module(f'{__name__}.{_MODULES[name]}'), name)
     else:

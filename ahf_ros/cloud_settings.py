@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ahf_ros.settings.parameter import check_parameters, parameter
+from ahf_ros.base.settings.parameter import check_parameters, parameter
 
 NEIGHBOURHOOD = 3.0
 """Radius of the neighbourhood of a centre, in radii of its dot: not beyond the code band."""

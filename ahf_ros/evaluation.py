@@ -19,9 +19,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ahf_ros.deprecation import deprecated_arguments
-from ahf_ros.target import UNDECODED, Identification, Target, TrueTarget, Truth
-from ahf_ros.text import printable
+from ahf_ros.base.deprecation import deprecated_arguments
+from ahf_ros.base.target import UNDECODED, Identification, Target, TrueTarget, Truth
+from ahf_ros.base.text import printable
 
 if TYPE_CHECKING:
     from ahf_ros.synthetic.scene import Rendering

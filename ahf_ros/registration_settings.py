@@ -6,9 +6,9 @@ import re
 from dataclasses import dataclass
 from typing import Any
 
+from ahf_ros.base.settings.parameter import check_parameters, parameter
+from ahf_ros.base.text import shown
 from ahf_ros.orientation.units import METRES
-from ahf_ros.settings.parameter import check_parameters, parameter
-from ahf_ros.text import shown
 
 _FRAME = re.compile(r'[A-Za-z_][\w.-]*(/[\w.-]+)*', re.ASCII)
 

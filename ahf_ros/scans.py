@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from ahf_ros.blas import one_blas_thread
+from ahf_ros.base.blas import one_blas_thread
+from ahf_ros.base.target import Target
 from ahf_ros.cloud_settings import CloudSettings
 from ahf_ros.interchange.coordinate_files import read_coordinates
 from ahf_ros.interchange.point_clouds import organised_points, target_scan, whole_points
@@ -17,7 +18,6 @@ from ahf_ros.orientation.points import MeasuredPoints
 from ahf_ros.registration.field import RegisteredScan
 from ahf_ros.registration.session import Registration
 from ahf_ros.registration_settings import RegistrationSettings
-from ahf_ros.target import Target
 
 
 def located(

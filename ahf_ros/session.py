@@ -9,8 +9,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ahf_ros.base.deprecation import deprecated_arguments
+from ahf_ros.base.settings.nested import updated
+from ahf_ros.base.target import Identification
+from ahf_ros.base.text import shown
 from ahf_ros.codes.families import AUTO
-from ahf_ros.deprecation import deprecated_arguments
 from ahf_ros.detectors import (
     Contesting,
     Detector,
@@ -27,15 +30,12 @@ from ahf_ros.filtering.identifier import Identifier
 from ahf_ros.filtering.trials import DetectorFunction
 from ahf_ros.imaging.stack import ImageStack
 from ahf_ros.session_settings import IdentificationSettings
-from ahf_ros.settings.nested import updated
 from ahf_ros.settling import SettlingIdentifier
-from ahf_ros.target import Identification
-from ahf_ros.text import shown
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
 
-    from ahf_ros.options import IdentificationOptions
+    from ahf_ros.base.options import IdentificationOptions
 
 
 @deprecated_arguments(positions=('settings', 'detector'))
@@ -60,7 +60,7 @@ def create_identifier(
         As for `Identifier`.
     **options
         Parameters that differ from `settings`, such as `family`, `expected_targets`, `threads`;
-        `ahf_ros.options` lists them.
+        `ahf_ros.base.options` lists them.
 
     Raises
     ------

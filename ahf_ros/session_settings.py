@@ -8,11 +8,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from ahf_ros.base.settings.parameter import check_parameters, parameter
+from ahf_ros.base.text import counted
 from ahf_ros.detectors import DETECTOR, DetectorSettings, detector_name, estimator
 from ahf_ros.filtering.settings import AdaptiveSettings
 from ahf_ros.imaging import MAXIMUM_IMAGES
-from ahf_ros.settings.parameter import check_parameters, parameter
-from ahf_ros.text import counted
 
 MAXIMUM_TARGETS = 100_000
 """Maximum of N."""

@@ -19,17 +19,17 @@ from typing import Any
 import cv2
 import numpy as np
 
-from ahf_ros.blas import one_blas_thread
-from ahf_ros.deprecation import deprecated_arguments
+from ahf_ros.base.blas import one_blas_thread
+from ahf_ros.base.deprecation import deprecated_arguments
+from ahf_ros.base.notices import said_once
+from ahf_ros.base.target import UNDECODED, Identification, Target, UndecodedTarget
+from ahf_ros.base.target_check import checked_targets
 from ahf_ros.detectors.evidence import Reading, evidence, is_clear, reading_of
 from ahf_ros.detectors.explained import without_targets
 from ahf_ros.filtering.genetic import Values
 from ahf_ros.filtering.identifier import Identifier, Memory
 from ahf_ros.filtering.trials import DetectorFunction, Trials
 from ahf_ros.imaging.stack import ImageStack
-from ahf_ros.notices import said_once
-from ahf_ros.target import UNDECODED, Identification, Target, UndecodedTarget
-from ahf_ros.target_check import checked_targets
 
 FIRST = 3
 """Images with targets in which all families are looked for, unless one makes it clear."""

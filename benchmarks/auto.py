@@ -13,12 +13,12 @@ from itertools import product
 
 import numpy as np
 
+from ahf_ros.base.target import Target, TrueTarget
 from ahf_ros.codes.families import AUTO, FAMILY_NAMES, print_in
 from ahf_ros.evaluation import score, total
 from ahf_ros.session import identify
 from ahf_ros.synthetic.patterns import LIGHT_NAMES, benchmark_lights
 from ahf_ros.synthetic.scene import SceneSettings, render
-from ahf_ros.target import Target, TrueTarget
 from benchmarks import report
 
 RADII = {'gsi': 4.0, 'cctag': 24.0}

@@ -26,6 +26,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ahf_ros.base.target import Target
 from ahf_ros.codes.dots import dot_family
 from ahf_ros.codes.gsi import point_family
 from ahf_ros.codes.ring import Family, canonical
@@ -41,7 +42,6 @@ from ahf_ros.detectors.ring.hypotheses import Hypotheses
 from ahf_ros.features.pyramid import image_pyramid
 from ahf_ros.imaging.image import as_gray
 from ahf_ros.synthetic.scene import Rendering, render
-from ahf_ros.target import Target
 from benchmarks import report
 from support.pictures.conditions import COMMON, FOREIGN, Scene, scenes
 from support.pictures.dot_conditions import dots_scenes, gsi_scenes, with_covered_dots

@@ -29,6 +29,7 @@ from typing import Any
 import cv2
 import numpy as np
 
+from ahf_ros.base.target import Identification
 from ahf_ros.detectors import Drafter, Refiner, create_detector
 from ahf_ros.evaluation import Score, score, total
 from ahf_ros.filtering.identifier import Identifier
@@ -41,7 +42,6 @@ from ahf_ros.filtering.settings import (
 )
 from ahf_ros.synthetic.patterns import LIGHT_NAMES
 from ahf_ros.synthetic.scene import Rendering, SceneSettings, render
-from ahf_ros.target import Identification
 from benchmarks import report
 from benchmarks.report import number, table
 from support.preprocessors import PREPROCESSORS

@@ -26,6 +26,7 @@ from typing import Any
 
 import numpy as np
 
+from ahf_ros.base.target import count_codes
 from ahf_ros.detectors import Drafter, create_detector
 from ahf_ros.filtering.genes import genes_of
 from ahf_ros.filtering.genetic import search
@@ -34,7 +35,6 @@ from ahf_ros.filtering.settings import PUBLISHED, FilterSettings, GeneticSetting
 from ahf_ros.imaging.logarithm import mapping
 from ahf_ros.session import create_identifier, identify
 from ahf_ros.synthetic.scene import SceneSettings, render
-from ahf_ros.target import count_codes
 from benchmarks.report import machine, machine_text, table
 from support.fourier import distances, sampled
 

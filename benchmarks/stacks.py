@@ -20,12 +20,12 @@ from typing import Any
 
 import numpy as np
 
+from ahf_ros.base.target import Identification
 from ahf_ros.session import create_identifier
 from ahf_ros.session_settings import StackSettings
 from ahf_ros.stream import identify_parts
 from ahf_ros.synthetic.patterns import LIGHT_NAMES
 from ahf_ros.synthetic.scene import SceneSettings, render
-from ahf_ros.target import Identification
 from benchmarks import report
 from benchmarks.report import number
 from benchmarks.rows import Row

@@ -18,9 +18,9 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from ahf_ros.base.target import Target
 from ahf_ros.detectors import create_detector
 from ahf_ros.settling import evident
-from ahf_ros.target import Target
 from benchmarks import report
 from support.pictures.textures import lookalikes, textured_image
 

@@ -6,14 +6,14 @@ import json
 import textwrap
 from pathlib import Path
 
+from ahf_ros.base.settings.nested import flat_parameters
+from ahf_ros.base.settings.parameter import Parameter
 from ahf_ros.nodes.settings import (
     DetectorNodeSettings,
     IlluminationNodeSettings,
     PoseNodeSettings,
     RegistrationNodeSettings,
 )
-from ahf_ros.settings.nested import flat_parameters
-from ahf_ros.settings.parameter import Parameter
 
 CONFIG = Path(__file__).resolve().parent.parent / 'config'
 NODES = {

@@ -11,11 +11,11 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from ahf_ros.base.settings.nested import flat_parameters
+from ahf_ros.base.settings.parameter import Parameter
 from ahf_ros.nodes.drivers import DRIVERS
 from ahf_ros.nodes.interfaces import NODES
 from ahf_ros.nodes.settings import DetectorNodeSettings, PoseNodeSettings
-from ahf_ros.settings.nested import flat_parameters
-from ahf_ros.settings.parameter import Parameter
 from ahf_ros.synthetic.patterns import LIGHT_NAMES
 from benchmarks.disturbances import TABLES, Count, markdown
 

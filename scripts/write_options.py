@@ -1,15 +1,15 @@
-"""Write ahf_ros/options.py, the types of keyword arguments, from the declarations in the code."""
+"""Write ahf_ros/base/options.py, the types of keyword arguments, from declarations in the code."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
+from ahf_ros.base.settings.nested import flat_parameters
+from ahf_ros.base.settings.parameter import Parameter
 from ahf_ros.detectors import DetectorSettings
 from ahf_ros.session_settings import IdentificationSettings
-from ahf_ros.settings.nested import flat_parameters
-from ahf_ros.settings.parameter import Parameter
 
-FILE = Path(__file__).resolve().parent.parent / 'ahf_ros' / 'options.py'
+FILE = Path(__file__).resolve().parent.parent / 'ahf_ros' / 'base' / 'options.py'
 OWN = ('detector',)  # an argument of its own, which may be a function as well
 HEAD = '''\
 """The types of settings that functions take by keyword; scripts/write_options.py writes them."""

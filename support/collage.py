@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
+from ahf_ros.base.target import TrueTarget
 from ahf_ros.codes.families import print_in
 from ahf_ros.synthetic.layout import quiet_radius
 from ahf_ros.synthetic.scene import SceneSettings, render
-from ahf_ros.target import TrueTarget
 
 _FOCAL_LENGTH = 6.0  # of the scenes, in their width
 

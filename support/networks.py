@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from ahf_ros.base.target import Identification, Target
 from ahf_ros.interchange.target_json import to_json
 from ahf_ros.orientation.camera import pinhole, project
 from ahf_ros.orientation.network import (
@@ -18,7 +19,6 @@ from ahf_ros.orientation.network import (
     ScaleBar,
 )
 from ahf_ros.orientation.solution import Solution, Start
-from ahf_ros.target import Identification, Target
 
 SIZE = 1600, 1200
 CALIBRATION = np.array([1500.0, 803.0, 596.0, -0.08, 0.02, 0.001, 2e-4, -1e-4, 1e-4, 2e-5])

@@ -1,6 +1,6 @@
 """Every reader of files, with files that it reads: what tests damage.
 
-A reader that is missing here fails a test, see `ahf_ros.opening.reader`.
+A reader that is missing here fails a test, see `ahf_ros.base.opening.reader`.
 """
 
 from __future__ import annotations
@@ -16,13 +16,13 @@ from typing import Any
 import cv2
 import numpy as np
 
+from ahf_ros.base.extras import missing
 from ahf_ros.cli.identify import image_paths
 from ahf_ros.codes import RING_FOLDER
 from ahf_ros.codes.data_file import read_data_file
 from ahf_ros.codes.dots import DOTS_DESIGN, dot_family
 from ahf_ros.codes.gsi import GSI_LIBRARY, point_family
 from ahf_ros.codes.ring import ring_family
-from ahf_ros.extras import missing
 from ahf_ros.interchange.arrays import read_arrays
 from ahf_ros.interchange.camera_files import read_camera
 from ahf_ros.interchange.cloud_files import read_cloud, write_pcd, write_ply

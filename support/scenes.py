@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from ahf_ros.base.target import Target
 from ahf_ros.detectors import create_detector
 from ahf_ros.evaluation import Score, score
 from ahf_ros.synthetic.scene import Rendering, SceneSettings, render
-from ahf_ros.target import Target
 
 SMALL = SceneSettings(width=700, height=500, targets=6, dot_radius=18.0, seed=5)
 

@@ -7,10 +7,10 @@ from collections.abc import Callable, Sequence
 import cv2
 import numpy as np
 
+from ahf_ros.base.target import Target
 from ahf_ros.codes.square import dictionary
 from ahf_ros.detectors import create_detector
 from ahf_ros.detectors.square.frames import centres
-from ahf_ros.target import Target
 
 FAMILY = 'apriltag_36h11'
 

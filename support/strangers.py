@@ -10,7 +10,7 @@ from typing import Any
 import cv2
 import numpy as np
 
-from ahf_ros.target import TrueTarget
+from ahf_ros.base.target import TrueTarget
 from support import ROOT
 
 TRUTH = ROOT / 'benchmarks' / 'truth'

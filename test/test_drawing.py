@@ -5,6 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from ahf_ros.base.target import (
+    UNDECODED,
+    FilterState,
+    Identification,
+    SquareMarker,
+    Target,
+    UndecodedTarget,
+)
 from ahf_ros.drawing import overlay as overlay_module
 from ahf_ros.drawing.overlay import (
     DECODED_COLOUR,
@@ -20,14 +28,6 @@ from ahf_ros.drawing.overlay import (
 )
 from ahf_ros.drawing.tiles import Tile, side_by_side
 from ahf_ros.synthetic.scene import SceneSettings
-from ahf_ros.target import (
-    UNDECODED,
-    FilterState,
-    Identification,
-    SquareMarker,
-    Target,
-    UndecodedTarget,
-)
 from support.scenes import rendered
 
 GRAY = np.full((240, 320), 120, np.uint8)

@@ -7,6 +7,7 @@ import math
 import pytest
 
 from ahf_ros import evaluation
+from ahf_ros.base.target import UNDECODED, Target, TrueTarget
 from ahf_ros.evaluation import (
     FALSE,
     FOUND,
@@ -19,7 +20,6 @@ from ahf_ros.evaluation import (
     table,
     total,
 )
-from ahf_ros.target import UNDECODED, Target, TrueTarget
 
 TRUTH = (TrueTarget(1, 10.0, 10.0), TrueTarget(2, 50.0, 10.0), TrueTarget(3, 90.0, 10.0))
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import configparser
 import re
 
-from ahf_ros.extras import REQUIRED
+from ahf_ros.base.extras import REQUIRED
 from support import ROOT
 
 

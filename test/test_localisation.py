@@ -7,9 +7,9 @@ import numpy as np
 import numpy.lib.recfunctions as rfn
 import pytest
 
+from ahf_ros.base.target import Target
 from ahf_ros.cloud_settings import CloudGrid
 from ahf_ros.localisation import Positions, positions
-from ahf_ros.target import Target
 
 KIND = np.dtype([('x', '<f4'), ('y', '<f4'), ('z', '<f4')])
 EXACT = np.dtype([('x', '<f8'), ('y', '<f8'), ('z', '<f8')])

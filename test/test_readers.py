@@ -24,7 +24,7 @@ from hypothesis import given, settings
 pytest.importorskip('PIL', reason='Pillow is not installed')
 
 import ahf_ros
-from ahf_ros.opening import READERS
+from ahf_ros.base.opening import READERS
 from support.hostile import generators, mutated, mutated_text
 from support.readers import Sample, samples
 
@@ -37,7 +37,7 @@ OPENERS = {'open', 'read_text', 'read_bytes', 'imread', 'loadtxt', 'genfromtxt',
 """Names of functions that open files."""
 
 MAY_OPEN = {
-    **dict.fromkeys(('opening.py', 'writing.py'), 'ways in and out'),
+    **dict.fromkeys(('base/opening.py', 'base/writing.py'), 'ways in and out'),
     'imaging/whole.py': 'standard error',
     'interchange/arrays.py': 'members of an archive in memory',
     'interchange/exif.py': 'a file that is open already',

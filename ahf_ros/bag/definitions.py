@@ -24,8 +24,8 @@ from rosbags.interfaces import (
 from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_typestore
 
 import ahf_ros
+from ahf_ros.base.text import reason_of
 from ahf_ros.interchange.target_messages import MessageTypes
-from ahf_ros.text import reason_of
 
 if TYPE_CHECKING:
     from rosbags.typesys.store import Typestore

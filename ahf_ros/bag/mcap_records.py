@@ -17,7 +17,7 @@ from mcap.opcode import Opcode
 from mcap.records import Channel, Chunk, McapRecord
 from mcap.stream_reader import StreamReader, breakup_chunk
 
-from ahf_ros.text import printable
+from ahf_ros.base.text import printable
 
 _MAGIC_SIZE = 8
 _RECORD = struct.Struct('<BQ')  # opcode, bytes of content

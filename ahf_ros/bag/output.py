@@ -26,10 +26,10 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 from ahf_ros.bag.definitions import CODED_TARGETS, COMPRESSED_IMAGE, typestore
 from ahf_ros.bag.mcap_records import add_checksums
 from ahf_ros.bag.source import METADATA, Source, read_metadata
+from ahf_ros.base.opening import check_regular, parsing
+from ahf_ros.base.parsed_yaml import parsed_yaml
+from ahf_ros.base.writing import place, write_whole
 from ahf_ros.filtering.identifier import Memory
-from ahf_ros.opening import check_regular, parsing
-from ahf_ros.parsed_yaml import parsed_yaml
-from ahf_ros.writing import place, write_whole
 
 JOURNAL = 'unfinished.sqlite'
 

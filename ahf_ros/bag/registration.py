@@ -14,10 +14,11 @@ from typing import Any
 
 import numpy as np
 
-from ahf_ros import ending
 from ahf_ros.bag.mcap_records import seconds
 from ahf_ros.bag.output import answer_topic, begun_with
 from ahf_ros.bag.source import Source
+from ahf_ros.base import ending
+from ahf_ros.base.text import counted, listed
 from ahf_ros.cloud_settings import CloudSettings
 from ahf_ros.interchange.image_messages import nanoseconds
 from ahf_ros.interchange.matching import ANSWER, ANSWERS, CLOUD, WAITING_MEMORY, Matcher
@@ -27,7 +28,6 @@ from ahf_ros.interchange.target_messages import is_answered
 from ahf_ros.localisation import labelled
 from ahf_ros.registration_settings import RegistrationSettings
 from ahf_ros.scans import Scans, known_targets, located, scan_cloud
-from ahf_ros.text import counted, listed
 
 POINT_CLOUD = 'sensor_msgs/msg/PointCloud2'
 

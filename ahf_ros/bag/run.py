@@ -19,7 +19,6 @@ from typing import Any
 import cv2
 from rosbags.rosbag2 import WriterError
 
-from ahf_ros import ending
 from ahf_ros.bag.definitions import CODED_TARGETS, COMPRESSED_IMAGE, message_types, typestore
 from ahf_ros.bag.mcap_records import seconds
 from ahf_ros.bag.output import (
@@ -39,16 +38,17 @@ from ahf_ros.bag.output import (
 )
 from ahf_ros.bag.registration import RegistrationTask, check_registration
 from ahf_ros.bag.source import METADATA, Message, Source
+from ahf_ros.base import ending
+from ahf_ros.base.opening import parsing
+from ahf_ros.base.settings.nested import flat_values
+from ahf_ros.base.writing import locked
 from ahf_ros.detectors import create_detector
 from ahf_ros.detectors.contract import Unavailable
 from ahf_ros.drawing.overlay import draw
 from ahf_ros.interchange.target_messages import coded_target_array, unanswered
-from ahf_ros.opening import parsing
 from ahf_ros.session_settings import IdentificationSettings, StackSettings
-from ahf_ros.settings.nested import flat_values
 from ahf_ros.settling import settled_families
 from ahf_ros.stream import STATUS, Answer, Frame, Kind, Remark, Stream, message_frame, why_failed
-from ahf_ros.writing import locked
 
 WRITING_ERRORS = (OSError, sqlite3.Error, WriterError)
 """Errors of writing a bag, such as a full disk or a folder without permission."""

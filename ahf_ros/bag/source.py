@@ -30,9 +30,9 @@ from rosbags.interfaces import Connection, ConnectionExtRosbag1, ConnectionExtRo
 
 from ahf_ros.bag.definitions import COMPRESSED_IMAGE, IMAGE, TypeStores, as_ros2
 from ahf_ros.bag.mcap_records import CutFile, has_checksums, read_records, seconds
-from ahf_ros.opening import parsing, read_text
-from ahf_ros.parsed_yaml import parsed_yaml
-from ahf_ros.text import counted, printable, reason_of
+from ahf_ros.base.opening import parsing, read_text
+from ahf_ros.base.parsed_yaml import parsed_yaml
+from ahf_ros.base.text import counted, printable, reason_of
 
 Message = tuple[Connection, int, bytes]
 """Topic of a message, its time of recording in ns, and its bytes."""

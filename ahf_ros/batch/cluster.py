@@ -27,10 +27,10 @@ from concurrent.futures import CancelledError
 from contextlib import suppress
 from typing import Any
 
+from ahf_ros.base.extras import need
+from ahf_ros.base.text import reason_of
 from ahf_ros.batch.engine import TRIES, EngineLost, Job, Report, TaskFailed, no_report
 from ahf_ros.batch.processes import ProcessEngine
-from ahf_ros.extras import need
-from ahf_ros.text import reason_of
 
 # What calls of a client raise whose scheduler is away.
 _CONNECTION_ERRORS = (OSError, asyncio.TimeoutError, asyncio.CancelledError, RuntimeError)

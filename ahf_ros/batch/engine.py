@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Generic, Protocol, TypeVar
 
-from ahf_ros import ending
+from ahf_ros.base import ending
 
 TRIES = 2
 """How often a task is tried whose process dies."""

@@ -11,23 +11,23 @@ from typing import Any
 
 import numpy as np
 
-from ahf_ros import ending
+from ahf_ros.base import ending
+from ahf_ros.base.doubt import doubt, repeated_remark
+from ahf_ros.base.edge_shift import edge_shift_remark
+from ahf_ros.base.opening import is_url, url_fingerprint
+from ahf_ros.base.target import UNDECODED, Identification, Target, UndecodedTarget
+from ahf_ros.base.text import listed
 from ahf_ros.batch.engine import Report, no_report
 from ahf_ros.batch.task import ImageOutcome, ImageTask, Level, Message
 from ahf_ros.detectors import Detector, DetectorSettings, create_detector
-from ahf_ros.doubt import doubt, repeated_remark
 from ahf_ros.drawing.overlay import draw, summary
-from ahf_ros.edge_shift import edge_shift_remark
 from ahf_ros.imaging.image import check_image, white_remark
 from ahf_ros.interchange.image_files import read_noted_image, write_image
 from ahf_ros.interchange.target_json import to_json
-from ahf_ros.opening import is_url, url_fingerprint
 from ahf_ros.session import create_identifier
 from ahf_ros.session_settings import IdentificationSettings
 from ahf_ros.settling import memory_of
 from ahf_ros.stream import identify_parts, refusal
-from ahf_ros.target import UNDECODED, Identification, Target, UndecodedTarget
-from ahf_ros.text import listed
 
 
 def identify_images(task: ImageTask, report: Report = no_report) -> ImageOutcome:

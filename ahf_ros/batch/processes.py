@@ -26,9 +26,9 @@ from pathlib import Path
 from types import FrameType
 from typing import Any
 
-from ahf_ros import ending
+from ahf_ros.base import ending
+from ahf_ros.base.text import reason_of
 from ahf_ros.batch.engine import TRIES, Job, Report, TaskFailed, no_report
-from ahf_ros.text import reason_of
 
 SHUTDOWN_TIMEOUT = 10 * ending.GRACE
 """Time after which a worker is taken to be stuck at its end, s."""

@@ -19,15 +19,15 @@ from pathlib import Path
 from shutil import copyfileobj
 from typing import Any
 
+from ahf_ros.base.inputs import check_output
+from ahf_ros.base.opening import check_regular, file_errors
+from ahf_ros.base.release import release
+from ahf_ros.base.settings.nested import flat_values
+from ahf_ros.base.writing import locked, whole_file
 from ahf_ros.batch.engine import Engine, Finished, TaskFailed, finished_tasks, in_order
 from ahf_ros.batch.identification import file_fingerprint
 from ahf_ros.batch.task import ImageOutcome, ImageTask, Level, Message
-from ahf_ros.inputs import check_output
 from ahf_ros.interchange.files import RESULTS_FILE
-from ahf_ros.opening import check_regular, file_errors
-from ahf_ros.release import release
-from ahf_ros.settings.nested import flat_values
-from ahf_ros.writing import locked, whole_file
 
 PREVIOUS = 'previous.jsonl'
 """Name of the file with the results that a run with other settings replaces."""

@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
+from ahf_ros.base.settings.nested import updated
+from ahf_ros.base.target import UNDECODED
 from ahf_ros.batch.engine import Engine, finished_tasks, in_order
 from ahf_ros.batch.results import outcome_of
 from ahf_ros.batch.task import ImageOutcome, ImageTask
 from ahf_ros.codes.families import AUTO
 from ahf_ros.detectors.evidence import Reading
 from ahf_ros.session_settings import IdentificationSettings
-from ahf_ros.settings.nested import updated
 from ahf_ros.settling import FIRST, evident_together
-from ahf_ros.target import UNDECODED
 
 _LOOK = {'ahf': False, 'expected_targets': 0, 'estimate_expected': False}
 _MOST = 12  # images that are looked at before any is identified

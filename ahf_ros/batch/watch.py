@@ -8,7 +8,7 @@ from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from ahf_ros import ending
+from ahf_ros.base import ending
 from ahf_ros.batch.engine import Engine
 from ahf_ros.batch.identification import file_fingerprint
 from ahf_ros.batch.results import Results, outcome_of

@@ -11,8 +11,8 @@ import os
 import sys
 from collections.abc import Sequence
 
-from ahf_ros import ending
-from ahf_ros.text import printable
+from ahf_ros.base import ending
+from ahf_ros.base.text import printable
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

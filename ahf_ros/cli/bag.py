@@ -13,6 +13,9 @@ from typing import TYPE_CHECKING, Any
 
 from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
 
+from ahf_ros.base.extras import need
+from ahf_ros.base.inputs import inputs_kept, registered_inputs
+from ahf_ros.base.settings.parameter import Parameter
 from ahf_ros.batch.engine import EngineLost, TaskFailed, finished_tasks
 from ahf_ros.batch.processes import SHUTDOWN_TIMEOUT
 from ahf_ros.cli import say, tell
@@ -30,11 +33,8 @@ from ahf_ros.cli.options import (
 )
 from ahf_ros.cloud_settings import CloudSettings
 from ahf_ros.detectors import is_foreign
-from ahf_ros.extras import need
-from ahf_ros.inputs import inputs_kept, registered_inputs
 from ahf_ros.registration_settings import RegistrationSettings
 from ahf_ros.session_settings import IdentificationSettings, StackSettings
-from ahf_ros.settings.parameter import Parameter
 
 if TYPE_CHECKING:
     from ahf_ros.bag.registration import Registered, RegistrationTask

@@ -9,10 +9,10 @@ from collections.abc import Sequence
 from importlib import import_module
 from types import ModuleType
 
+from ahf_ros.base.extras import MissingExtra, missing
+from ahf_ros.base.inputs import inputs_kept
+from ahf_ros.base.release import release
 from ahf_ros.cli import say, tell
-from ahf_ros.extras import MissingExtra, missing
-from ahf_ros.inputs import inputs_kept
-from ahf_ros.release import release
 
 COMMANDS = {
     'identify': ('cli.identify', 'Identify the coded targets in images.'),

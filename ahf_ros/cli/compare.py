@@ -9,11 +9,11 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ahf_ros.base.settings.parameter import Parameter
 from ahf_ros.cli import say, tell
 from ahf_ros.cli.options import add_option, add_quiet, input_path, output_path, parsed_by
 from ahf_ros.cli.tables import identifiers, print_table
 from ahf_ros.orientation.units import decimals
-from ahf_ros.settings.parameter import Parameter
 
 if TYPE_CHECKING:
     from ahf_ros.orientation.congruence import Comparison
@@ -63,10 +63,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Compare the epochs, show what moved, and write files."""
+    from ahf_ros.base.writing import write_whole
     from ahf_ros.interchange.files import csv_table
     from ahf_ros.interchange.network_results import read_network
     from ahf_ros.orientation.congruence import compare
-    from ahf_ros.writing import write_whole
 
     try:
         epochs = [read_network(path).points for path in (options.first, options.second)]

@@ -8,6 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from ahf_ros.base.opening import file_errors
+from ahf_ros.base.settings.parameter import Parameter
+from ahf_ros.base.target import Identification, Target, TrueTarget
 from ahf_ros.cli.options import add_option, output_path
 from ahf_ros.drawing.overlay import (
     DECODED_COLOUR,
@@ -20,12 +23,9 @@ from ahf_ros.drawing.tiles import Tile, side_by_side
 from ahf_ros.evaluation import FALSE, RIGHT, WRONG, judge, line, method
 from ahf_ros.filtering.homomorphic import filtered
 from ahf_ros.interchange.image_files import write_image
-from ahf_ros.opening import file_errors
 from ahf_ros.session import create_identifier
-from ahf_ros.settings.parameter import Parameter
 from ahf_ros.synthetic.patterns import LIGHT_NAMES
 from ahf_ros.synthetic.scene import SceneSettings, render
-from ahf_ros.target import Identification, Target, TrueTarget
 
 WAYS: dict[str, dict[str, Any]] = {
     'traditional': {'detector': 'traditional', 'ahf': False},

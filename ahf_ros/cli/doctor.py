@@ -12,8 +12,8 @@ import sys
 from collections.abc import Iterator
 from importlib import metadata
 
-from ahf_ros.extras import EXTRAS, REQUIRED, missing
-from ahf_ros.release import release
+from ahf_ros.base.extras import EXTRAS, REQUIRED, missing
+from ahf_ros.base.release import release
 
 _OPENCV = tuple(
     f'opencv-{kind}python{head}' for kind in ('', 'contrib-') for head in ('', '-headless')

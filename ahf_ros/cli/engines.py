@@ -8,11 +8,11 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ahf_ros.base.settings.nested import updated
 from ahf_ros.batch.engine import Engine, Job, Report, SerialEngine, available_cores, no_report
 from ahf_ros.batch.processes import ProcessEngine
 from ahf_ros.cli import tell
 from ahf_ros.session_settings import IdentificationSettings
-from ahf_ros.settings.nested import updated
 
 if TYPE_CHECKING:
     from rich.progress import Progress, ProgressColumn

@@ -9,11 +9,11 @@ import argparse
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from ahf_ros.base.settings.parameter import Parameter
+from ahf_ros.base.text import counted
 from ahf_ros.cli import say, tell
 from ahf_ros.cli.options import Group, add_option, input_name, parsed_by
 from ahf_ros.interchange.export.formats import FORMATS, Export
-from ahf_ros.settings.parameter import Parameter
-from ahf_ros.text import counted
 
 if TYPE_CHECKING:
     from ahf_ros.interchange.export.survey import Control, MeasuredImage

@@ -17,6 +17,13 @@ from glob import glob, has_magic
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
+from ahf_ros.base.doubt import doubtful_remark
+from ahf_ros.base.extras import missing
+from ahf_ros.base.inputs import check_output, register_input
+from ahf_ros.base.opening import Most, file_errors, is_url, read_text, urls_named
+from ahf_ros.base.settings.parameter import parameters
+from ahf_ros.base.target import UNDECODED
+from ahf_ros.base.text import listed, shown
 from ahf_ros.batch.engine import Engine, EngineLost, available_cores
 from ahf_ros.batch.task import ImageOutcome, ImageTask, Level, with_machine
 from ahf_ros.cli import say, tell
@@ -33,15 +40,8 @@ from ahf_ros.cli.options import (
     settings_from,
 )
 from ahf_ros.codes.families import AUTO
-from ahf_ros.doubt import doubtful_remark
-from ahf_ros.extras import missing
-from ahf_ros.inputs import check_output, register_input
 from ahf_ros.interchange.files import RESULTS_FILE
-from ahf_ros.opening import Most, file_errors, is_url, read_text, urls_named
 from ahf_ros.session_settings import IdentificationSettings, StackSettings
-from ahf_ros.settings.parameter import parameters
-from ahf_ros.target import UNDECODED
-from ahf_ros.text import listed, shown
 
 if TYPE_CHECKING:
     import numpy as np

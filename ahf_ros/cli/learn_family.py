@@ -11,13 +11,13 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ahf_ros.base.opening import parsing
+from ahf_ros.base.settings.parameter import parameters
+from ahf_ros.base.writing import write_files, write_whole
 from ahf_ros.cli import say, tell
 from ahf_ros.cli.identify import image_paths
 from ahf_ros.cli.options import add_option, input_name, output_path
 from ahf_ros.detectors.contract import DetectorSettings
-from ahf_ros.opening import parsing
-from ahf_ros.settings.parameter import parameters
-from ahf_ros.writing import write_files, write_whole
 
 if TYPE_CHECKING:
     import numpy as np

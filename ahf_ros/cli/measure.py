@@ -258,8 +258,8 @@ def _show(points: MeasuredPoints, *found: Any) -> None:
 
 
 def _write(folder: Path, *found: Any) -> None:
+    from ahf_ros.base.writing import write_files
     from ahf_ros.interchange.files import csv_table
-    from ahf_ros.writing import write_files
 
     tables = {
         f'{name}.csv': csv_table([_cell(value, '.9g') for value in row] for row in rows)

@@ -6,8 +6,8 @@ import argparse
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
+from ahf_ros.base.settings.parameter import Parameter
 from ahf_ros.cli.options import add_option, input_name, parsed_by
-from ahf_ros.settings.parameter import Parameter
 
 if TYPE_CHECKING:
     from ahf_ros.interchange.network_inputs import NetworkInputs

@@ -9,15 +9,15 @@ from collections.abc import Callable, Collection, Iterable
 from pathlib import Path
 from typing import Any, TypeVar
 
+from ahf_ros.base.inputs import register_input
+from ahf_ros.base.settings.nested import assemble, flat_parameters
+from ahf_ros.base.settings.parameter import Parameter, parameters
 from ahf_ros.cloud_settings import CloudSettings
 from ahf_ros.codes.families import files_by_name
 from ahf_ros.detectors.contract import DetectorSettings
 from ahf_ros.filtering.settings import AdaptiveSettings
-from ahf_ros.inputs import register_input
 from ahf_ros.registration_settings import RegistrationSettings
 from ahf_ros.session_settings import IdentificationSettings
-from ahf_ros.settings.nested import assemble, flat_parameters
-from ahf_ros.settings.parameter import Parameter, parameters
 
 Settings = TypeVar('Settings')
 Value = TypeVar('Value')

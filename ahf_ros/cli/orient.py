@@ -15,6 +15,9 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ahf_ros.base.extras import need
+from ahf_ros.base.settings.parameter import Parameter
+from ahf_ros.base.text import printable
 from ahf_ros.cli import tell
 from ahf_ros.cli.mounting import (
     add_mounting_arguments,
@@ -30,10 +33,7 @@ from ahf_ros.cli.options import (
     output_path,
     parsed_by,
 )
-from ahf_ros.extras import need
 from ahf_ros.interchange.export.formats import NETWORK_FORMATS, parsed_export
-from ahf_ros.settings.parameter import Parameter
-from ahf_ros.text import printable
 
 if TYPE_CHECKING:
     from rich.console import Console

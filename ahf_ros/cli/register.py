@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ahf_ros.base.opening import parsing
 from ahf_ros.cli import say, tell
 from ahf_ros.cli.options import (
     add_quiet,
@@ -21,7 +22,6 @@ from ahf_ros.cli.options import (
     settings_from,
 )
 from ahf_ros.cloud_settings import CloudSettings
-from ahf_ros.opening import parsing
 from ahf_ros.registration_settings import RegistrationSettings
 from ahf_ros.session_settings import IdentificationSettings
 

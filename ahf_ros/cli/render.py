@@ -7,18 +7,18 @@ from collections.abc import Iterator
 from dataclasses import replace
 from typing import NamedTuple
 
-from ahf_ros import ending
+from ahf_ros.base import ending
+from ahf_ros.base.inputs import release_input
+from ahf_ros.base.settings.nested import flat_parameters
+from ahf_ros.base.settings.parameter import Parameter
+from ahf_ros.base.target import TrueTarget
 from ahf_ros.cli import say, tell
 from ahf_ros.cli.options import add_option, output_path, settings_from
-from ahf_ros.inputs import release_input
 from ahf_ros.interchange.image_files import write_image
 from ahf_ros.interchange.truth_files import read_truth, write_truth
-from ahf_ros.settings.nested import flat_parameters
-from ahf_ros.settings.parameter import Parameter
 from ahf_ros.synthetic.bent.picture import BentRendering, render_bent
 from ahf_ros.synthetic.bent.settings import BentSettings
 from ahf_ros.synthetic.scene import Rendering, SceneSettings, render
-from ahf_ros.target import TrueTarget
 
 _MAKERS: dict[str, type[SceneSettings | BentSettings]] = {
     'wall': SceneSettings,

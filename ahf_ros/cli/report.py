@@ -6,6 +6,7 @@ import argparse
 from functools import partial
 from pathlib import Path
 
+from ahf_ros.base.text import counted
 from ahf_ros.cli import say, tell
 from ahf_ros.cli.engines import progress_bar
 from ahf_ros.cli.options import (
@@ -19,7 +20,6 @@ from ahf_ros.cli.options import (
 from ahf_ros.interchange.truth_files import read_truth
 from ahf_ros.report.page import ReportSettings, write_page
 from ahf_ros.report.results import read_results
-from ahf_ros.text import counted
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

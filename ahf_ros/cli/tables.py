@@ -6,7 +6,7 @@ import sys
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
-from ahf_ros.text import printable
+from ahf_ros.base.text import printable
 
 if TYPE_CHECKING:
     from rich.console import Console

@@ -7,6 +7,7 @@ import sys
 from contextlib import closing, redirect_stdout
 from functools import partial
 
+from ahf_ros.base.settings.parameter import Parameter
 from ahf_ros.batch.engine import EngineLost, available_cores
 from ahf_ros.batch.identification import identify_images
 from ahf_ros.batch.results import Results, Unwritable
@@ -28,7 +29,6 @@ from ahf_ros.cli.options import (
 from ahf_ros.interchange.files import RESULTS_FILE
 from ahf_ros.interchange.image_files import image_suffixes
 from ahf_ros.session_settings import IdentificationSettings
-from ahf_ros.settings.parameter import Parameter
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NoReturn
 
-from ahf_ros.opening import Most, read_text, reader
-from ahf_ros.parsed_yaml import Listing, Mapping, parsed_yaml
+from ahf_ros.base.opening import Most, read_text, reader
+from ahf_ros.base.parsed_yaml import Listing, Mapping, parsed_yaml
 
 
 @dataclass(frozen=True, slots=True)

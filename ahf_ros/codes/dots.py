@@ -15,11 +15,11 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from ahf_ros.base.opening import reader
 from ahf_ros.codes.cyclic import CyclicFamily, mirrored_words, smallest_rotation
 from ahf_ros.codes.data_file import pinhole_in, read_data_file
 from ahf_ros.codes.kept import kept_while_unchanged
 from ahf_ros.codes.prints import Disc, Proportions, Ring, Shape
-from ahf_ros.opening import reader
 
 DOTS_DESIGN = Path(__file__).with_name('dots.json')
 """The design of rings of dots that this package prints."""

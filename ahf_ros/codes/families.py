@@ -211,9 +211,9 @@ def prints_of(files: str) -> dict[str, FamilyPrint]:
 @kept_while_unchanged
 def _described(path: str) -> FamilyPrint:
     """Return the family that a data file describes, with its print."""
+    from ahf_ros.base.opening import Most, read_bytes
     from ahf_ros.codes import dots, gsi, ring
     from ahf_ros.codes.data_file import read_data_file
-    from ahf_ros.opening import Most, read_bytes
 
     fields = dict(read_data_file(path).items())
     kind = 'gsi' if 'template' in fields else 'dots' if 'dot_circle' in fields else 'ring'

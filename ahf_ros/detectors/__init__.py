@@ -13,9 +13,12 @@ from importlib.metadata import EntryPoint, entry_points
 from pkgutil import resolve_name
 from typing import TYPE_CHECKING, NamedTuple
 
+from ahf_ros.base.deprecation import deprecated_arguments
+from ahf_ros.base.settings.nested import updated
+from ahf_ros.base.settings.parameter import Parameter
+from ahf_ros.base.text import printable, reason_of, shown
 from ahf_ros.codes import SQUARE_NAMES
 from ahf_ros.codes.families import AUTO, FAMILY_NAMES, KINDS, FamilyPrint, check_numbers
-from ahf_ros.deprecation import deprecated_arguments
 from ahf_ros.detectors.contract import (
     Contesting,
     Detector,
@@ -26,15 +29,12 @@ from ahf_ros.detectors.contract import (
     Narrowing,
     Refiner,
 )
-from ahf_ros.settings.nested import updated
-from ahf_ros.settings.parameter import Parameter
-from ahf_ros.text import printable, reason_of, shown
 
 if TYPE_CHECKING:
     import numpy as np
     from typing_extensions import Unpack
 
-    from ahf_ros.options import DetectorOptions
+    from ahf_ros.base.options import DetectorOptions
 
 __all__ = [
     'DETECTOR',

@@ -11,8 +11,8 @@ from typing import TypeVar
 
 import numpy as np
 
+from ahf_ros.base.target import UNDECODED, Target
 from ahf_ros.detectors.undecoded import undecoded
-from ahf_ros.target import UNDECODED, Target
 
 Rivals = Callable[[int], np.ndarray]
 """From the index of a claim to which of k claims are its rivals, ndarray of bool, shape (k,).

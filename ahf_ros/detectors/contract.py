@@ -7,9 +7,9 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, ClassVar, Protocol, TypeVar, runtime_checkable
 
+from ahf_ros.base.settings.parameter import check_parameters, parameter
+from ahf_ros.base.target import Target
 from ahf_ros.codes.families import ACCEPTED, AUTO, FamilyPrint, prints_in
-from ahf_ros.settings.parameter import check_parameters, parameter
-from ahf_ros.target import Target
 
 if TYPE_CHECKING:
     import numpy as np

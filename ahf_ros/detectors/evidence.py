@@ -6,7 +6,7 @@ import math
 from collections import defaultdict
 from collections.abc import Iterable
 
-from ahf_ros.target import UNDECODED, Target, UndecodedTarget
+from ahf_ros.base.target import UNDECODED, Target, UndecodedTarget
 
 _DOUBTFUL = 0.9  # confidence up to which words are read in nearly any texture
 _CERTAIN = 1e-3  # probability that a target is wrong, below which it counts for no more

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import fields
 
-from ahf_ros.target import UNDECODED, Target, UndecodedTarget
+from ahf_ros.base.target import UNDECODED, Target, UndecodedTarget
 
 UNLIKELY = 0.02
 """Confidence of an ID below which a target counts as unread."""

@@ -13,9 +13,8 @@ from dataclasses import dataclass, field
 import cv2
 import numpy as np
 
-from ahf_ros.doubt import DOUBTFUL_BELOW
-from ahf_ros.imaging.image import stretched_to_8_bit
-from ahf_ros.target import (
+from ahf_ros.base.doubt import DOUBTFUL_BELOW
+from ahf_ros.base.target import (
     UNDECODED,
     DottedTarget,
     Identification,
@@ -25,6 +24,7 @@ from ahf_ros.target import (
     UndecodedTarget,
     reach_of,
 )
+from ahf_ros.imaging.image import stretched_to_8_bit
 
 Colour = tuple[int, int, int]
 """Blue, green, red."""

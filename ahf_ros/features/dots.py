@@ -8,9 +8,9 @@ from itertools import pairwise
 
 import numpy as np
 
+from ahf_ros.base.notices import tell_left_out
 from ahf_ros.features import frame
 from ahf_ros.features.array_record import ArrayRecord
-from ahf_ros.notices import tell_left_out
 
 _SAME = 0.3  # largest distance of the centres of the same dot in its radius; of radii in ln
 _PART = 100_000  # pairs looked at at a time, which bounds the memory

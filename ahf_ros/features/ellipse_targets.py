@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from ahf_ros.base.target import UNDECODED, Target
 from ahf_ros.features.frame import ellipse_axes
-from ahf_ros.target import UNDECODED, Target
 
 
 def ellipse_fields(

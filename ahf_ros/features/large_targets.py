@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
+from ahf_ros.base.target import DottedTarget, Target
 from ahf_ros.features.pyramid import ImagePyramid, Octave, octaves
-from ahf_ros.target import DottedTarget, Target
 
 Identify = Callable[[Octave], Sequence[Target]]
 """From an octave to its targets, in px of its half of the image."""

@@ -31,10 +31,10 @@ from functools import lru_cache
 import cv2
 import numpy as np
 
+from ahf_ros.base.target import FilterState
 from ahf_ros.filtering.settings import FilterSettings
 from ahf_ros.imaging.image import check_image
 from ahf_ros.imaging.logarithm import logarithm, mapping, sample_lattice
-from ahf_ros.target import FilterState
 
 _TOLERANCE = 1e-3  # weight of a kernel, of 1, beyond its last tap: errors within one gray level
 _MARGIN = 12  # width of the periodic border around a logarithm, px; few filters reach further

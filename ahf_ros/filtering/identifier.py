@@ -25,16 +25,11 @@ from typing import Any
 
 import numpy as np
 
-from ahf_ros.blas import one_blas_thread
-from ahf_ros.deprecation import deprecated_arguments
-from ahf_ros.edge_shift import median_edge_shift
-from ahf_ros.filtering.genes import BEGINNING, FIRST, genes_of, tuned
-from ahf_ros.filtering.genetic import SearchResult, Values, search
-from ahf_ros.filtering.settings import PUBLISHED, AdaptiveSettings
-from ahf_ros.filtering.trials import DetectorFunction, Trials, confirmed, fused
-from ahf_ros.imaging.stack import ImageStack
-from ahf_ros.notices import said_once
-from ahf_ros.target import (
+from ahf_ros.base.blas import one_blas_thread
+from ahf_ros.base.deprecation import deprecated_arguments
+from ahf_ros.base.edge_shift import median_edge_shift
+from ahf_ros.base.notices import said_once
+from ahf_ros.base.target import (
     UNDECODED,
     FilterState,
     Identification,
@@ -45,7 +40,12 @@ from ahf_ros.target import (
     repeated_targets,
     sorted_targets,
 )
-from ahf_ros.target_check import checked_targets
+from ahf_ros.base.target_check import checked_targets
+from ahf_ros.filtering.genes import BEGINNING, FIRST, genes_of, tuned
+from ahf_ros.filtering.genetic import SearchResult, Values, search
+from ahf_ros.filtering.settings import PUBLISHED, AdaptiveSettings
+from ahf_ros.filtering.trials import DetectorFunction, Trials, confirmed, fused
+from ahf_ros.imaging.stack import ImageStack
 
 Refinement = Callable[[np.ndarray, Sequence[Target]], Sequence[Target]]
 """From the image as received and targets found in a filtered one to the same targets, with centres
@@ -252,7 +252,7 @@ class Identifier:
         ------
         ValueError
             If the image is not accepted, N is not an integer of at least 0, the detector or the
-            refinement returns what `ahf_ros.target_check` does not accept, or the estimate
+            refinement returns what `ahf_ros.base.target_check` does not accept, or the estimate
             is not an integer of at least 0.
         Exception
             Whatever the detector, the refinement or the estimate raises.

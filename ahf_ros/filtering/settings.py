@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from ahf_ros.settings.parameter import check_parameters, numbers_in, parameter
-from ahf_ros.text import shown
+from ahf_ros.base.settings.parameter import check_parameters, numbers_in, parameter
+from ahf_ros.base.text import shown
 
 PUBLISHED, EXTENDED = 'published', 'extended'
 

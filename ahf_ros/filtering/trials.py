@@ -14,13 +14,13 @@ from typing import Any
 import cv2
 import numpy as np
 
+from ahf_ros.base.target import UNDECODED, Target, count_codes, sorted_targets
+from ahf_ros.base.target_check import checked_targets
 from ahf_ros.filtering.genes import tuned
 from ahf_ros.filtering.genetic import Values
 from ahf_ros.filtering.homomorphic import HomomorphicFilter
 from ahf_ros.filtering.settings import AdaptiveSettings
 from ahf_ros.imaging.stack import ImageStack
-from ahf_ros.target import UNDECODED, Target, count_codes, sorted_targets
-from ahf_ros.target_check import checked_targets
 
 DetectorFunction = Callable[[np.ndarray], list[Target]]
 """From an 8-bit image, shape (height, width), to the targets in it. Called from several threads at

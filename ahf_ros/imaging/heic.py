@@ -7,9 +7,9 @@ from io import BytesIO
 import cv2
 import numpy as np
 
-from ahf_ros.extras import missing, need
+from ahf_ros.base.extras import missing, need
+from ahf_ros.base.opening import parsing
 from ahf_ros.imaging.image import check_size
-from ahf_ros.opening import parsing
 
 ENDINGS = '.heic', '.heif'
 """Endings of files of HEIC."""

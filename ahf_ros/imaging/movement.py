@@ -17,11 +17,11 @@ from dataclasses import dataclass, replace
 import cv2
 import numpy as np
 
-from ahf_ros.blas import one_blas_thread
+from ahf_ros.base.blas import one_blas_thread
+from ahf_ros.base.target import UNDECODED, Target
 from ahf_ros.imaging.image import as_gray
 from ahf_ros.imaging.logarithm import LOG_OFFSET
 from ahf_ros.imaging.resampling import remapped
-from ahf_ros.target import UNDECODED, Target
 
 _SIGNIFICANT = 6.0  # standard deviations from zero, a displacement that is movement
 _MINIMUM_EDGES = 60  # that coincide, for a displacement to be measured

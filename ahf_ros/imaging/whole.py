@@ -15,9 +15,9 @@ from tempfile import mkstemp
 import cv2
 import numpy as np
 
+from ahf_ros.base.text import printable
 from ahf_ros.imaging.png import is_png, png_chunks
 from ahf_ros.imaging.tiff import first_directory, is_tiff
-from ahf_ros.text import printable
 
 _JPEG = b'\xff\xd8'
 _END, _SCAN = 0xD9, 0xDA  # markers of JPEG

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ahf_ros.opening import Most, read_bytes, reader
+from ahf_ros.base.opening import Most, read_bytes, reader
 
 _COMPRESSIONS = zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED
 _ENCRYPTED = 1  # flag of a member

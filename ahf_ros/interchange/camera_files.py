@@ -12,7 +12,9 @@ from typing import Any
 import cv2
 import numpy as np
 
-from ahf_ros.opening import LARGEST, Most, read_text, reader
+from ahf_ros.base.opening import LARGEST, Most, read_text, reader
+from ahf_ros.base.parsed_yaml import parsed_yaml
+from ahf_ros.base.text import shown
 from ahf_ros.orientation.camera import (
     EQUIDISTANT,
     PARAMETERS,
@@ -21,8 +23,6 @@ from ahf_ros.orientation.camera import (
 )
 from ahf_ros.orientation.network import CameraView, FloatArray
 from ahf_ros.orientation.points import correlations, standard_deviations
-from ahf_ros.parsed_yaml import parsed_yaml
-from ahf_ros.text import shown
 
 BROWN = ('', 'plumb_bob', 'rational_polynomial')
 """Names of Brown's model; the last one has more coefficients, which it stands for."""

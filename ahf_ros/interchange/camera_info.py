@@ -10,7 +10,7 @@ from typing import Any
 import cv2
 import numpy as np
 
-from ahf_ros.target import SquareMarker, Target
+from ahf_ros.base.target import SquareMarker, Target
 
 MODELS = {
     'plumb_bob': (4, 5),

@@ -20,8 +20,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ahf_ros.opening import LARGEST, Most, read_bytes, reader
-from ahf_ros.text import shown
+from ahf_ros.base.opening import LARGEST, Most, read_bytes, reader
+from ahf_ros.base.text import shown
 
 AXES = ('x', 'y', 'z')
 """Fields that a cloud must have."""

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
+from ahf_ros.base.opening import reader
 from ahf_ros.interchange.tables import POINT, Row, one_of, read_table
-from ahf_ros.opening import reader
 from ahf_ros.orientation.measurement import CalibratedLength
 from ahf_ros.orientation.network import ControlPoint, FloatArray, ScaleBar
 

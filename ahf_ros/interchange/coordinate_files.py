@@ -8,15 +8,15 @@ from pathlib import Path
 
 import numpy as np
 
+from ahf_ros.base.opening import Most, parsed_json, read_text, reader
+from ahf_ros.base.text import shown
+from ahf_ros.base.writing import complete
 from ahf_ros.interchange.control_files import control_points
 from ahf_ros.interchange.network_results import read_network
 from ahf_ros.interchange.tables import POINT, Row, read_table
-from ahf_ros.opening import Most, parsed_json, read_text, reader
 from ahf_ros.orientation.network import ControlPoint
 from ahf_ros.orientation.points import MeasuredPoints
 from ahf_ros.orientation.units import METRES
-from ahf_ros.text import shown
-from ahf_ros.writing import complete
 
 
 @reader('coordinates of targets: what ahf orient writes, CSV or JSON')

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import PurePath
 from typing import Any
 
-from ahf_ros.text import printable, shown
+from ahf_ros.base.text import printable, shown
 
 RESULTS_FILE = 'results.jsonl'
 """Name of the file in a folder that `ahf identify --output` writes."""

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-from ahf_ros.extras import need
+from ahf_ros.base.extras import need
 
 _COMMON = Path(__file__).parent / 'html'  # the head and the colours of all pages
 

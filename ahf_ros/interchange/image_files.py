@@ -10,15 +10,15 @@ from pathlib import Path, PurePath
 import cv2
 import numpy as np
 
-from ahf_ros.deprecation import deprecated_arguments
-from ahf_ros.extras import missing
+from ahf_ros.base.deprecation import deprecated_arguments
+from ahf_ros.base.extras import missing
+from ahf_ros.base.inputs import register_input
+from ahf_ros.base.opening import Most, read_bytes, reader
+from ahf_ros.base.writing import write_whole
 from ahf_ros.imaging.headers import HEIC, UPRIGHT, read_header
 from ahf_ros.imaging.heic import ENDINGS, decoded_heic
 from ahf_ros.imaging.image import as_oriented, check_size, without_gaps
 from ahf_ros.imaging.whole import decoded
-from ahf_ros.inputs import register_input
-from ahf_ros.opening import Most, read_bytes, reader
-from ahf_ros.writing import write_whole
 
 SUFFIXES = ('.bmp', '.jpeg', '.jpg', '.png', '.tif', '.tiff')
 """Endings of the image files that are tested; others are tried."""

@@ -15,9 +15,9 @@ from typing import Any
 import cv2
 import numpy as np
 
+from ahf_ros.base.text import shown
 from ahf_ros.imaging.image import check_size, without_gaps
 from ahf_ros.interchange.image_files import NotedImage, decode_bytes
-from ahf_ros.text import shown
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,6 +9,7 @@ from pathlib import Path, PurePath
 
 import numpy as np
 
+from ahf_ros.base.text import counted
 from ahf_ros.interchange.camera_files import CameraFile
 from ahf_ros.interchange.exif import Exif
 from ahf_ros.interchange.observation_files import ImagePoint, ObservedPhotograph
@@ -22,7 +23,6 @@ from ahf_ros.orientation.network import (
     once_a_photograph,
     without,
 )
-from ahf_ros.text import counted
 
 _SINGULAR = 1e-9  # least ratio of the variances of an image point along its axes
 

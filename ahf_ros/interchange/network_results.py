@@ -12,10 +12,13 @@ from typing import Any
 
 import numpy as np
 
+from ahf_ros.base.opening import LARGEST, Most, inside, parsed_json, read_text, reader
+from ahf_ros.base.target_check import MAXIMUM_ID, checked_integer, checked_number
+from ahf_ros.base.text import shown
+from ahf_ros.base.writing import check_set, complete, write_set
 from ahf_ros.interchange.arrays import read_arrays
 from ahf_ros.interchange.camera_files import FISHEYE, opencv_yaml, ros_yaml
 from ahf_ros.interchange.files import csv_table
-from ahf_ros.opening import LARGEST, Most, inside, parsed_json, read_text, reader
 from ahf_ros.orientation.camera import EQUIDISTANT, PARAMETERS, parameters_of
 from ahf_ros.orientation.deviations import bar_deviations, control_deviations
 from ahf_ros.orientation.network import CameraView, FloatArray, IntArray, Rejection
@@ -23,9 +26,6 @@ from ahf_ros.orientation.points import MeasuredPoints, blocks, standard_deviatio
 from ahf_ros.orientation.solution import Solution
 from ahf_ros.orientation.strength import rays_of
 from ahf_ros.orientation.transform import Transform
-from ahf_ros.target_check import MAXIMUM_ID, checked_integer, checked_number
-from ahf_ros.text import shown
-from ahf_ros.writing import check_set, complete, write_set
 
 NETWORK_FILE = 'network.json'
 POINTS_FILE = 'points.csv'

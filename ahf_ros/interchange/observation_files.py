@@ -9,15 +9,15 @@ from typing import Any
 
 import numpy as np
 
+from ahf_ros.base.opening import reader
+from ahf_ros.base.target import UNDECODED
+from ahf_ros.base.target_check import MAXIMUM_LENGTH_PX
+from ahf_ros.base.text import shown
 from ahf_ros.interchange.export.survey import MAXIMUM_SIDE, measured_image
 from ahf_ros.interchange.files import checked_file_name
 from ahf_ros.interchange.tables import Row, one_of, read_table
 from ahf_ros.interchange.target_json import json_lines
-from ahf_ros.opening import reader
 from ahf_ros.orientation.network import FloatArray
-from ahf_ros.target import UNDECODED
-from ahf_ros.target_check import MAXIMUM_LENGTH_PX
-from ahf_ros.text import shown
 
 _PRECISIONS = (
     ('sigma',),

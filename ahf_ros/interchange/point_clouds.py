@@ -10,11 +10,11 @@ from typing import Any
 
 import numpy as np
 
+from ahf_ros.base.target import UNDECODED
+from ahf_ros.base.text import shown
 from ahf_ros.interchange.cloud_files import AXES
 from ahf_ros.interchange.image_messages import check_rows
 from ahf_ros.registration.scan import Scan
-from ahf_ros.target import UNDECODED
-from ahf_ros.text import shown
 
 COVARIANCE = ('xx', 'xy', 'xz', 'yy', 'yz', 'zz')
 """Fields of target points with the covariance of x, y and z."""

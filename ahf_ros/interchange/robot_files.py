@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from ahf_ros.base.opening import reader
 from ahf_ros.interchange.tables import Row, one_of, read_by_image, read_table
-from ahf_ros.opening import reader
 from ahf_ros.orientation.camera import rotation_matrices
 from ahf_ros.orientation.network import FloatArray
 from ahf_ros.orientation.transform import Transform, rotation_vector

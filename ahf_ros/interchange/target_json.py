@@ -8,11 +8,10 @@ from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any
 
-from ahf_ros.doubt import doubt
-from ahf_ros.interchange.files import RESULTS_FILE, checked_file_name
-from ahf_ros.opening import Most, parsed_json, read_text, reader
-from ahf_ros.target import DottedTarget, Identification, SquareMarker, Target, UndecodedTarget
-from ahf_ros.target_check import (
+from ahf_ros.base.doubt import doubt
+from ahf_ros.base.opening import Most, parsed_json, read_text, reader
+from ahf_ros.base.target import DottedTarget, Identification, SquareMarker, Target, UndecodedTarget
+from ahf_ros.base.target_check import (
     MAXIMUM_ID,
     MAXIMUM_LENGTH_PX,
     checked_integer,
@@ -20,7 +19,8 @@ from ahf_ros.target_check import (
     checked_targets,
     checked_text,
 )
-from ahf_ros.text import reason_of, shown
+from ahf_ros.base.text import reason_of, shown
+from ahf_ros.interchange.files import RESULTS_FILE, checked_file_name
 
 _NAMES = [it.name for it in fields(Target)]
 _ABSENT = {'id': None, 'x': None, 'y': None, 'code': 0, 'semi_major': 0.0, 'semi_minor': 0.0}

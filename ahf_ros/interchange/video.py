@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ahf_ros.extras import need
+from ahf_ros.base.extras import need
 from ahf_ros.imaging.image import check_size
 
 _KEY_FRAME = 1  # in the flags of a packet, AV_PKT_FLAG_KEY of FFmpeg
@@ -43,7 +43,7 @@ class VideoDecoder:
 
     Raises
     ------
-    ahf_ros.extras.MissingExtra
+    ahf_ros.base.extras.MissingExtra
         If PyAV is not installed.
     """
 

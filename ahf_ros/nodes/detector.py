@@ -19,7 +19,8 @@ from rclpy.lifecycle.node import LifecycleNodeMixin
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_srvs.srv import Trigger
 
-from ahf_ros import ending
+from ahf_ros.base import ending
+from ahf_ros.base.text import printable
 from ahf_ros.interchange.point_clouds import organised_points
 from ahf_ros.nodes.answers import Answers
 from ahf_ros.nodes.cloud import points_of
@@ -51,7 +52,6 @@ from ahf_ros.nodes.topics import (
 from ahf_ros.nodes.video import Video
 from ahf_ros.nodes.watch import Expected, Watch
 from ahf_ros.srv import Identify
-from ahf_ros.text import printable
 
 ACTIVE = 'active'
 """State of a node that works."""

@@ -9,11 +9,11 @@ from dataclasses import dataclass, field, replace
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from std_msgs.msg import Header
 
-from ahf_ros.edge_shift import edge_shift_remark
+from ahf_ros.base.edge_shift import edge_shift_remark
+from ahf_ros.base.target import Identification
+from ahf_ros.base.text import printable
 from ahf_ros.interchange.image_messages import nanoseconds
 from ahf_ros.nodes.process import ProcessNode
-from ahf_ros.target import Identification
-from ahf_ros.text import printable
 
 PERIOD = 1.0
 """Period of /diagnostics, s."""

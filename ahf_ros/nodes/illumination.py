@@ -12,6 +12,7 @@ from sensor_msgs.msg import CameraInfo, Image
 from std_msgs.msg import Header
 
 from ahf_ros import msg
+from ahf_ros.base.target import Identification
 from ahf_ros.interchange.target_messages import coded_target_array
 from ahf_ros.msg import CodedTargetArray
 from ahf_ros.nodes.messages import image_message
@@ -19,7 +20,6 @@ from ahf_ros.nodes.parameters import ParameterSettings
 from ahf_ros.nodes.process import ProcessNode
 from ahf_ros.nodes.settings import IlluminationNodeSettings
 from ahf_ros.synthetic.scene import Rendering, SceneSettings, render
-from ahf_ros.target import Identification
 
 
 class SceneMessages(NamedTuple):

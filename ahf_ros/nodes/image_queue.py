@@ -24,6 +24,7 @@ from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import CompressedImage, Image
 from std_msgs.msg import Header
 
+from ahf_ros.base.text import printable
 from ahf_ros.interchange.image_messages import nanoseconds
 from ahf_ros.interchange.target_messages import DROPPED
 from ahf_ros.msg import CodedTargetArray
@@ -34,7 +35,6 @@ from ahf_ros.nodes.process import LOG_PERIOD, ProcessNode
 from ahf_ros.nodes.settings import LOSSLESS
 from ahf_ros.settling import settled_families
 from ahf_ros.stream import STATUS, Answer, Kind, Remark, message_frame, why_refused
-from ahf_ros.text import printable
 
 SEGMENT = 64 * 2**20
 """Size beyond which a file is not continued, bytes. Its space is free once all in it was taken."""

@@ -10,6 +10,7 @@ import textwrap
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from ahf_ros.base.settings.nested import flat_parameters
 from ahf_ros.nodes.settings import (
     DetectorNodeSettings,
     IlluminationNodeSettings,
@@ -17,7 +18,6 @@ from ahf_ros.nodes.settings import (
     RegistrationNodeSettings,
     ScoreboardSettings,
 )
-from ahf_ros.settings.nested import flat_parameters
 
 _HELP = """\
 usage: ros2 run ahf_ros {node} --ros-args -p PARAMETER:=VALUE -r TOPIC:=OTHER ...

@@ -16,12 +16,12 @@ from ament_index_python.packages import (
 from launch.actions import DeclareLaunchArgument, LogInfo, OpaqueFunction, Shutdown
 from launch_ros.actions import Node
 
+from ahf_ros.base.settings.nested import flat_parameters
+from ahf_ros.base.settings.parameter import Parameter
 from ahf_ros.nodes.drivers import Driver, beside
 from ahf_ros.nodes.interfaces import NODES
 from ahf_ros.nodes.settings import RegistrationNodeSettings
 from ahf_ros.nodes.topics import LOSSLESS_SUBSCRIPTION, POINTS, SUBSCRIPTION
-from ahf_ros.settings.nested import flat_parameters
-from ahf_ros.settings.parameter import Parameter
 
 USUAL = NODES['detector'].usual
 """Parameters that are arguments of every launch file with a detector of the user's."""

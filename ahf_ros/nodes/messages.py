@@ -30,6 +30,7 @@ from sensor_msgs.msg import Image, PointCloud2, PointField
 from std_msgs.msg import ColorRGBA, Header
 from visualization_msgs.msg import ImageMarker, Marker, MarkerArray
 
+from ahf_ros.base.target import UNDECODED
 from ahf_ros.codes.square import library_name
 from ahf_ros.drawing.overlay import DECODED_COLOUR, DOUBTFUL_COLOUR, Colour
 from ahf_ros.interchange.cloud_files import AXES
@@ -39,7 +40,6 @@ from ahf_ros.localisation import Positions, labelled
 from ahf_ros.msg import CodedTarget, CodedTargetArray
 from ahf_ros.orientation.transform import Transform
 from ahf_ros.registration.field import Field, RegisteredScan
-from ahf_ros.target import UNDECODED
 
 _DATATYPES = {kind: number for number, kind in NUMBERS.items()}
 _PLACE = [(name, '<f4') for name in AXES] + [('id', '<i4')]

@@ -16,9 +16,9 @@ from rcl_interfaces.msg import (
 from rclpy.node import Node
 from rclpy.parameter import Parameter as RosParameter
 
-from ahf_ros.settings.nested import assemble, flat_parameters
-from ahf_ros.settings.parameter import Parameter
-from ahf_ros.text import printable
+from ahf_ros.base.settings.nested import assemble, flat_parameters
+from ahf_ros.base.settings.parameter import Parameter
+from ahf_ros.base.text import printable
 
 Settings = TypeVar('Settings')
 

@@ -11,6 +11,8 @@ from std_msgs.msg import Header
 
 from ahf_ros import msg
 from ahf_ros.advice import Adviser
+from ahf_ros.base.target import Identification
+from ahf_ros.base.text import counted, listed
 from ahf_ros.detectors import Detector, create_detector
 from ahf_ros.detectors.contract import Unavailable
 from ahf_ros.filtering.homomorphic import filtered
@@ -18,8 +20,6 @@ from ahf_ros.interchange.target_messages import coded_target_array, unanswered
 from ahf_ros.msg import CodedTargetArray
 from ahf_ros.nodes.settings import LOSSLESS, DetectorNodeSettings
 from ahf_ros.stream import Answer, Stream
-from ahf_ros.target import Identification
-from ahf_ros.text import counted, listed
 
 IN_A_ROW = 10
 """Images with n other than N after which it is said."""

@@ -16,6 +16,8 @@ from rclpy.node import NodeNameNonExistentError
 from sensor_msgs.msg import CameraInfo
 from std_msgs.msg import Header
 
+from ahf_ros.base.target import UNDECODED, Target
+from ahf_ros.base.text import listed, printable
 from ahf_ros.interchange.camera_info import Calibration, places_with_covariances
 from ahf_ros.interchange.coordinate_files import read_coordinates
 from ahf_ros.interchange.image_messages import nanoseconds
@@ -44,8 +46,6 @@ from ahf_ros.orientation.single_image import (
     known_targets,
     pose_of,
 )
-from ahf_ros.target import UNDECODED, Target
-from ahf_ros.text import listed, printable
 
 POSE = '~/pose'
 """Topic of the pose of the camera in the frame of the targets."""

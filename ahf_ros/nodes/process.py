@@ -28,12 +28,12 @@ from rclpy.task import Future
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 from rclpy.utilities import remove_ros_args
 
-from ahf_ros.ending import ignore_ending, signalled
+from ahf_ros.base.ending import ignore_ending, signalled
+from ahf_ros.base.text import reason_of, shown
 from ahf_ros.nodes.inputs import Input
 from ahf_ros.nodes.parameters import unknown_parameters
 from ahf_ros.nodes.processes import Processes
 from ahf_ros.nodes.topics import PUBLISHER, declare_qos, qos_profile
-from ahf_ros.text import reason_of, shown
 
 LOG_PERIOD = 5.0
 """Minimum time between two log lines of the same kind about messages, s."""

@@ -17,6 +17,7 @@ from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import Header
 from std_srvs.srv import Trigger
 
+from ahf_ros.base.text import counted, printable
 from ahf_ros.interchange.image_messages import nanoseconds
 from ahf_ros.interchange.matching import ANSWER, ANSWERS, CLOUD, WAITING_MEMORY, Matcher
 from ahf_ros.interchange.point_clouds import whole_points
@@ -38,7 +39,6 @@ from ahf_ros.nodes.tf import PACKAGE, Frames
 from ahf_ros.nodes.topics import ANSWERS_KEPT, POINTS
 from ahf_ros.nodes.watch import Expected, Silence
 from ahf_ros.scans import Scans, known_targets, scan_cloud
-from ahf_ros.text import counted, printable
 
 _NO_TF = (
     f'tf is True and the package {PACKAGE} is not there: no tf; ros-DISTRIBUTION-tf2-msgs '

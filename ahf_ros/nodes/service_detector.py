@@ -14,13 +14,13 @@ from rclpy.node import Node
 from rclpy.task import Future
 from std_msgs.msg import Header
 
+from ahf_ros.base.target import Target
+from ahf_ros.base.target_check import checked_targets
+from ahf_ros.base.text import printable
 from ahf_ros.interchange.target_messages import identification_from
 from ahf_ros.nodes.messages import image_message
 from ahf_ros.nodes.pipeline import Stopping
 from ahf_ros.srv import Identify
-from ahf_ros.target import Target
-from ahf_ros.target_check import checked_targets
-from ahf_ros.text import printable
 
 _POLL = 0.2  # interval between checks that the service still exists, s
 _DISCOVERY = 3.0  # time that discovery may take, s

@@ -9,9 +9,9 @@ import threading
 from functools import partial
 from pkgutil import resolve_name
 
-from ahf_ros.ending import has_arrived, ignore_ending, signalled
-from ahf_ros.inputs import inputs_kept
-from ahf_ros.text import printable
+from ahf_ros.base.ending import has_arrived, ignore_ending, signalled
+from ahf_ros.base.inputs import inputs_kept
+from ahf_ros.base.text import printable
 
 NODES = {
     'detector': 'ahf_ros.nodes.detector:DetectorNode',
@@ -40,7 +40,9 @@ def start(node: str, arguments: list[str] | None = None) -> int:
     """
     global _status
     signalled()
-    os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')  # before numpy is loaded; see ahf_ros.blas
+    os.environ.setdefault(
+        'OPENBLAS_NUM_THREADS', '1'
+    )  # before numpy is loaded; see ahf_ros.base.blas
     atexit.register(_leave_threads)  # before all others, so that it is called last
     own = sys.argv[1:] if arguments is None else arguments
     if '--ros-args' in own:

@@ -15,10 +15,10 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import CompressedImage, Image
 
+from ahf_ros.base.settings.parameter import Parameter
 from ahf_ros.nodes.drivers import beside
 from ahf_ros.nodes.parameters import descriptor
 from ahf_ros.nodes.settings import FFMPEG, IMAGE_TRANSPORTS, PACKAGES, RAW
-from ahf_ros.settings.parameter import Parameter
 
 IMAGE = 'image'
 """Base topic of the images; remapping it moves the topics of this module as well."""

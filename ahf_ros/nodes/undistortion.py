@@ -13,6 +13,7 @@ from sensor_msgs.msg import CameraInfo
 from std_msgs.msg import Header
 
 from ahf_ros import msg
+from ahf_ros.base.target import Identification
 from ahf_ros.interchange.camera_info import Calibration, calibration, undistorted_targets
 from ahf_ros.interchange.image_messages import nanoseconds
 from ahf_ros.interchange.target_messages import coded_target_array
@@ -21,7 +22,6 @@ from ahf_ros.nodes.diagnostics import Tally
 from ahf_ros.nodes.inputs import Input
 from ahf_ros.nodes.process import LOG_PERIOD, ProcessNode
 from ahf_ros.nodes.topics import ANSWERS_KEPT, UNDISTORTED, camera_info_topic
-from ahf_ros.target import Identification
 
 CHANGES = 1000
 """Maximum number of different calibrations that are remembered."""

@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ahf_ros.blas import one_blas_thread
+from ahf_ros.base.blas import one_blas_thread
+from ahf_ros.base.text import counted
 from ahf_ros.orientation import normals
 from ahf_ros.orientation.calibration import undetermined, unlike_given, unlike_pixels
 from ahf_ros.orientation.camera import PARAMETERS, parameters_of
@@ -25,7 +26,6 @@ from ahf_ros.orientation.similarity import similarity_between
 from ahf_ros.orientation.solution import Solution, Start
 from ahf_ros.orientation.suspects import examined
 from ahf_ros.orientation.testing import CRITICAL, MISFIT
-from ahf_ros.text import counted
 
 Mask = NDArray[np.bool_]
 _INNER = Datum('inner')

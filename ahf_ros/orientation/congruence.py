@@ -27,6 +27,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ahf_ros.base.text import counted
 from ahf_ros.orientation.network import FloatArray
 from ahf_ros.orientation.points import MeasuredPoints
 from ahf_ros.orientation.similarity import on_a_line
@@ -39,7 +40,6 @@ from ahf_ros.orientation.stable_datum import (
     f_probability,
     localised,
 )
-from ahf_ros.text import counted
 
 LEVEL = 0.05
 """Share of pairs of epochs without movement that a test may take for one with."""

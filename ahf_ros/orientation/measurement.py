@@ -13,11 +13,11 @@ from itertools import combinations
 
 import numpy as np
 
+from ahf_ros.base.text import counted
 from ahf_ros.orientation.alignment import Alignment
 from ahf_ros.orientation.network import FloatArray
 from ahf_ros.orientation.points import MeasuredPoints, blocks, entries, standard_deviations
 from ahf_ros.orientation.units import other_unit
-from ahf_ros.text import counted
 
 LINES, LENGTHS_A_LINE, SHARE_OF_DIAGONAL = 7, 5, 2 / 3
 """What VDI/VDE 2634-1 wants at least: lines, lengths in each, and the longest length."""

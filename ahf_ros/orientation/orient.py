@@ -9,7 +9,8 @@ from itertools import combinations
 
 import numpy as np
 
-from ahf_ros.blas import one_blas_thread
+from ahf_ros.base.blas import one_blas_thread
+from ahf_ros.base.text import counted, listed
 from ahf_ros.orientation.adjustment import adjust
 from ahf_ros.orientation.calibration import UNDETERMINED
 from ahf_ros.orientation.datum import Datum
@@ -28,7 +29,6 @@ from ahf_ros.orientation.start import FEWEST_PHOTOGRAPHS, oriented, reversal, st
 from ahf_ros.orientation.triples import FEWEST_COMMON, known_calibrations
 from ahf_ros.orientation.views import views_of
 from ahf_ros.orientation.zoom import of_other_zooms, with_common_zooms, zooms_of_groups
-from ahf_ros.text import counted, listed
 
 LINE = 0.01
 """Targets are on a line where their spread across it is less than this share of that along it."""

@@ -11,12 +11,12 @@ from itertools import combinations, islice
 
 import numpy as np
 
+from ahf_ros.base.text import listed
 from ahf_ros.orientation.datum import Datum
 from ahf_ros.orientation.knowledge import kind
 from ahf_ros.orientation.network import FloatArray, IntArray, Network
 from ahf_ros.orientation.similarity import Similarity, on_a_line, similarity_between
 from ahf_ros.orientation.solution import Start
-from ahf_ros.text import listed
 
 _MISFIT = 0.15  # of control points, relative to their extent, that no approximate value explains
 _STRETCH = 1.2  # ratio of lengths that none explains

@@ -9,7 +9,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ahf_ros.blas import one_blas_thread
+from ahf_ros.base.blas import one_blas_thread
+from ahf_ros.base.target import UNDECODED, Target
+from ahf_ros.base.text import counted, listed
 from ahf_ros.orientation.camera import PARAMETERS, linearise, undistort
 from ahf_ros.orientation.network import FloatArray, Rejection
 from ahf_ros.orientation.planar import principal_axes
@@ -27,8 +29,6 @@ from ahf_ros.orientation.pose_fit import (
 )
 from ahf_ros.orientation.testing import CRITICAL
 from ahf_ros.orientation.transform import Transform, camera_pose
-from ahf_ros.target import UNDECODED, Target
-from ahf_ros.text import counted, listed
 
 FEWEST = 4
 """Targets that a pose needs: three leave up to four poses."""

@@ -11,12 +11,12 @@ from typing import TypeVar
 
 import numpy as np
 
+from ahf_ros.base.text import counted, listed
 from ahf_ros.orientation.mounting import Contradiction, Mounted, Station, mounted
 from ahf_ros.orientation.network import FloatArray
 from ahf_ros.orientation.solution import Solution
 from ahf_ros.orientation.transform import Transform, camera_pose
 from ahf_ros.orientation.units import METRES
-from ahf_ros.text import counted, listed
 
 ROBOT_UNITS = ('m', 'mm')
 

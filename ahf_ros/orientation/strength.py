@@ -8,11 +8,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ahf_ros.base.text import counted, listed
 from ahf_ros.orientation.calibration import rolled
 from ahf_ros.orientation.network import FloatArray, IntArray
 from ahf_ros.orientation.solution import Solution
 from ahf_ros.orientation.views import largest_angles
-from ahf_ros.text import counted, listed
 
 FEW_RAYS = 3
 """Number of rays with which a wrong one is noticed but cannot be named."""

@@ -22,7 +22,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ahf_ros.extras import need
+from ahf_ros.base.extras import need
 from ahf_ros.orientation.network import FloatArray
 from ahf_ros.orientation.normals import BEHIND, Design, Layout, whitened_lengths
 from ahf_ros.orientation.solution import Start

@@ -18,13 +18,13 @@ from typing import Literal
 
 import numpy as np
 
+from ahf_ros.base.text import counted, listed
 from ahf_ros.orientation.calibration import usual_deviations
 from ahf_ros.orientation.deviations import bar_deviations, control_deviations, with_unit
 from ahf_ros.orientation.points import standard_deviations
 from ahf_ros.orientation.solution import Solution
 from ahf_ros.orientation.strength import NO_CHECKS, weaknesses
 from ahf_ros.orientation.testing import MISFIT
-from ahf_ros.text import counted, listed
 
 Grade = Literal['good', 'weak', 'bad']
 

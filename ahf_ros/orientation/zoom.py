@@ -12,6 +12,7 @@ from functools import cache
 
 import numpy as np
 
+from ahf_ros.base.text import counted
 from ahf_ros.orientation.camera import pinhole
 from ahf_ros.orientation.network import FloatArray, IntArray, Network
 from ahf_ros.orientation.refinement import refine
@@ -19,7 +20,6 @@ from ahf_ros.orientation.resection import FEWEST_POINTS, Resection, resections
 from ahf_ros.orientation.solution import Solution, Start
 from ahf_ros.orientation.triples import LENS, STEPS, focal_steps
 from ahf_ros.orientation.views import View, lengths_of, spread_of
-from ahf_ros.text import counted
 
 _ZOOMED = 0.01  # change of a photograph's focal length that is another zoom
 _SUSPECT = 0.8  # share of a photograph's observations that agree, below which its zoom is tested

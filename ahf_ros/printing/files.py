@@ -11,8 +11,8 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from ahf_ros.base.extras import need
 from ahf_ros.codes.designs import Arc
-from ahf_ros.extras import need
 from ahf_ros.printing.drawing import Drawing, Ink
 from ahf_ros.printing.sheets import Sheets
 

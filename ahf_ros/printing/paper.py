@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
-from ahf_ros.text import shown
+from ahf_ros.base.text import shown
 
 _UNITS = {'mm': 1.0, 'cm': 10.0, 'm': 1000.0, 'in': 25.4, 'pt': 25.4 / 72}
 _NUMBER = r'\s*(\d+\.?\d*|\.\d+)\s*'

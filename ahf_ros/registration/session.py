@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ahf_ros.blas import one_blas_thread
+from ahf_ros.base.blas import one_blas_thread
 from ahf_ros.orientation.points import MeasuredPoints
 from ahf_ros.registration.adjustment import Adjusted, adjusted
 from ahf_ros.registration.field import Field, RegisteredScan, added, known_field

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ahf_ros.base.text import counted
 from ahf_ros.interchange.network_results import rejections
 from ahf_ros.orientation.camera import parameters_of
 from ahf_ros.orientation.deviations import bar_deviations, control_deviations
@@ -15,7 +16,6 @@ from ahf_ros.orientation.strength import rays_of, semi_axes
 from ahf_ros.orientation.units import decimals
 from ahf_ros.orientation.verdict import undetermined_parameters
 from ahf_ros.orientation.views import largest_angles
-from ahf_ros.text import counted
 
 Rows = Sequence[tuple[str, ...]]
 

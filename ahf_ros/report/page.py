@@ -18,17 +18,11 @@ from typing import Any
 import cv2
 
 from ahf_ros.advice import LOOKED_AT, advice
-from ahf_ros.codes.families import AUTO, prints_in
-from ahf_ros.detectors.contract import DetectorSettings
-from ahf_ros.doubt import DOUBTFUL_BELOW, doubt
-from ahf_ros.edge_shift import edge_shift_remark
-from ahf_ros.evaluation import FALSE, RIGHT, WRONG, judge
-from ahf_ros.interchange.html_pages import page_script, page_style, page_template, script_json
-from ahf_ros.opening import parsing
-from ahf_ros.report.images import Picture, fitted, shown_image, thumbnail
-from ahf_ros.report.results import ImageResult
-from ahf_ros.settings.parameter import check_parameters, parameter
-from ahf_ros.target import (
+from ahf_ros.base.doubt import DOUBTFUL_BELOW, doubt
+from ahf_ros.base.edge_shift import edge_shift_remark
+from ahf_ros.base.opening import parsing
+from ahf_ros.base.settings.parameter import check_parameters, parameter
+from ahf_ros.base.target import (
     UNDECODED,
     DottedTarget,
     SquareMarker,
@@ -38,8 +32,14 @@ from ahf_ros.target import (
     UndecodedTarget,
     count_codes,
 )
-from ahf_ros.text import printable, reason_of
-from ahf_ros.writing import whole_file
+from ahf_ros.base.text import printable, reason_of
+from ahf_ros.base.writing import whole_file
+from ahf_ros.codes.families import AUTO, prints_in
+from ahf_ros.detectors.contract import DetectorSettings
+from ahf_ros.evaluation import FALSE, RIGHT, WRONG, judge
+from ahf_ros.interchange.html_pages import page_script, page_style, page_template, script_json
+from ahf_ros.report.images import Picture, fitted, shown_image, thumbnail
+from ahf_ros.report.results import ImageResult
 
 _PAGE = Path(__file__).parent / 'page'  # the template, and the styles and scripts that it holds
 _SCRIPTS = ('data', 'table', 'viewer', 'plots', 'details', 'overview', 'main')  # in their order

@@ -8,12 +8,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from ahf_ros.base.opening import LARGEST, Most, file_errors, parsed_json, parsing, read_text
+from ahf_ros.base.target import UNDECODED, FilterState, SearchTrace, Target
+from ahf_ros.base.target_check import MAXIMUM_ID, checked_integer, checked_number
+from ahf_ros.base.text import shown
 from ahf_ros.interchange.files import RESULTS_FILE
 from ahf_ros.interchange.target_json import targets_from_json
-from ahf_ros.opening import LARGEST, Most, file_errors, parsed_json, parsing, read_text
-from ahf_ros.target import UNDECODED, FilterState, SearchTrace, Target
-from ahf_ros.target_check import MAXIMUM_ID, checked_integer, checked_number
-from ahf_ros.text import shown
 
 _MAPPING = ('log_offset', 'black_percentile', 'white_percentile')
 _MAXIMUM_SIDE = 65536  # px

@@ -10,11 +10,12 @@ from typing import Any
 import cv2
 import numpy as np
 
-from ahf_ros.blas import one_blas_thread
+from ahf_ros.base.blas import one_blas_thread
+from ahf_ros.base.settings.parameter import check_parameters, parameter
+from ahf_ros.base.target import Target, TrueTarget, sorted_targets
 from ahf_ros.codes.families import ONE, FamilyPrint, print_in
 from ahf_ros.codes.gsi import PointFamily
 from ahf_ros.codes.prints import Proportions
-from ahf_ros.settings.parameter import check_parameters, parameter
 from ahf_ros.synthetic.camera import Camera, Sensor, tilted_camera
 from ahf_ros.synthetic.covers import card_cover, distractor_cover, ink_cover
 from ahf_ros.synthetic.layout import (
@@ -28,7 +29,6 @@ from ahf_ros.synthetic.layout import (
 from ahf_ros.synthetic.patterns import LIGHT_NAMES, light_pattern, turned
 from ahf_ros.synthetic.prints import Mark, mark_at, print_mark
 from ahf_ros.synthetic.radiance import paper_texture, rig_projector, wall_radiance
-from ahf_ros.target import Target, TrueTarget, sorted_targets
 
 _CARD_WIDTH = math.cos(math.pi / 8)  # of eight sides, as a share of the distance of its corners
 _MAXIMUM_SHIFT = 0.35  # of edges, in dot radii: nearly half a sector of the finest ring codes

@@ -10,11 +10,11 @@ from typing import Any
 
 import numpy as np
 
+from ahf_ros.base.target import DottedTarget
 from ahf_ros.codes.gsi import GSI_LIBRARY, point_family
 from ahf_ros.detectors import create_detector
 from ahf_ros.synthetic.patterns import LIGHT_NAMES
 from ahf_ros.synthetic.scene import Rendering, SceneSettings
-from ahf_ros.target import DottedTarget
 
 GSI = SceneSettings(
     family='gsi', width=1600, height=1200, targets=6, dot_radius=5.0, focal_length=6.0

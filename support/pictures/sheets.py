@@ -14,11 +14,11 @@ from typing import Any
 import cv2
 import numpy as np
 
+from ahf_ros.base.target import TrueTarget
 from ahf_ros.codes.prints import Cells
 from ahf_ros.codes.ring import FAMILY_NAMES, family
 from ahf_ros.codes.square import CellPrint, dictionary
 from ahf_ros.synthetic.covers import Cover, ink_cover
-from ahf_ros.target import TrueTarget
 from support.pictures.exposure import GAMMA, INK, WHITE, Cell, Exposure
 
 Ink = Callable[[float], Cover]

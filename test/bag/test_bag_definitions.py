@@ -14,12 +14,12 @@ from ahf_ros.bag.definitions import (
     message_types,
     typestore,
 )
+from ahf_ros.base.target import UNDECODED, FilterState, Identification, Target
 from ahf_ros.interchange.target_messages import (
     coded_target_array,
     identification_from,
     is_answered,
 )
-from ahf_ros.target import UNDECODED, FilterState, Identification, Target
 
 FOUND = Identification(
     (

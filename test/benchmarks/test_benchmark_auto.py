@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 
-from ahf_ros.target import TrueTarget
+from ahf_ros.base.target import TrueTarget
 from benchmarks.auto import farthest, main
 
 

@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from ahf_ros.target import Target, TrueTarget
+from ahf_ros.base.target import Target, TrueTarget
 from benchmarks import identification
 from benchmarks.rows import normalised_squares
 

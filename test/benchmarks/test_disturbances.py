@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from ahf_ros.base.target import Target, TrueTarget
 from ahf_ros.codes.ring import FAMILY_NAMES, family
 from ahf_ros.codes.square import SQUARE_NAMES
-from ahf_ros.target import Target, TrueTarget
 from benchmarks import disturbances
 from support.pictures import occluders
 from support.pictures.disturbed import Targets

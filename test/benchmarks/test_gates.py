@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from ahf_ros.base.target import Target
 from ahf_ros.synthetic.scene import SceneSettings, render
-from ahf_ros.target import Target
 from benchmarks import gates
 from benchmarks.changed import replace, verdicts
 from benchmarks.gates import (

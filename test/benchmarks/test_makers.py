@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ahf_ros.target import TrueTarget
+from ahf_ros.base.target import TrueTarget
 from benchmarks.confidence import readings_of
 from benchmarks.makers import BOUNDS, markdown, records
 from benchmarks.report import about

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from ahf_ros.base.extras import EXTRAS
 from ahf_ros.cli import doctor
-from ahf_ros.extras import EXTRAS
 from support.command_line import ahf, python, status
 
 EXTRA = ('rclpy', 'asyncio', 'dask', 'distributed', 'jinja2', 'rosbags', 'mcap', 'scipy')

@@ -12,8 +12,8 @@ from pathlib import Path
 import pytest
 
 from ahf_ros import Identification
+from ahf_ros.base.extras import EXTRAS, REQUIRED, MissingExtra, missing
 from ahf_ros.codes.gsi import point_family, positions_of
-from ahf_ros.extras import EXTRAS, REQUIRED, MissingExtra, missing
 from ahf_ros.interchange.network_results import write_network
 from ahf_ros.orientation.testing import unit_weight
 from support import ROOT

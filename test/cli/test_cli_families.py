@@ -8,11 +8,11 @@ from pathlib import Path
 import pytest
 
 from ahf_ros import SceneSettings, identify, render
+from ahf_ros.base.target import reach_of
 from ahf_ros.codes.dots import DOTS_DESIGN
 from ahf_ros.codes.families import files_by_name
 from ahf_ros.report.page import _reach
 from ahf_ros.report.results import result_from_json
-from ahf_ros.target import reach_of
 from support.command_line import status
 
 MINE = 'family: mine\nbits: 10\nband: [1.6, 2.4]\nwords: all\nnumbers: {first_bit: lowest}\n'

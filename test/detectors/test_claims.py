@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from ahf_ros.base.target import UNDECODED, Target
 from ahf_ros.detectors.claims import best_targets
-from ahf_ros.target import UNDECODED, Target
 
 
 def test_of_targets_each_place_and_each_id_has_one():

@@ -9,6 +9,7 @@ import cv2
 import numpy as np
 import pytest
 
+from ahf_ros.base.target import UNDECODED, DottedTarget
 from ahf_ros.codes.dots import DOTS_DESIGN, dot_family
 from ahf_ros.detectors import DetectorSettings, create_detector
 from ahf_ros.detectors.dots.detector import find_rings
@@ -17,7 +18,6 @@ from ahf_ros.detectors.dots.rings import CERTAIN, WEIGHTS
 from ahf_ros.features.frame import ellipse_axes
 from ahf_ros.features.pyramid import image_pyramid
 from ahf_ros.synthetic.scene import Rendering
-from ahf_ros.target import UNDECODED, DottedTarget
 from support.scenes import counted, rendering
 
 SIZE = {'family': 'dots', 'width': 800, 'height': 600, 'targets': 6, 'dot_radius': 10.0, 'seed': 4}

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from ahf_ros.base.target import UNDECODED
 from ahf_ros.detectors import create_detector
 from ahf_ros.detectors.dots.published import local_otsu, otsu
-from ahf_ros.target import UNDECODED
 from support.scenes import rendering
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from ahf_ros.base.target import UNDECODED, DottedTarget, Identification
 from ahf_ros.codes.gsi import GSI_LIBRARY, point_family, positions_of, value_of
 from ahf_ros.detectors import create_detector
 from ahf_ros.detectors.gsi.evidence import (
@@ -21,7 +22,6 @@ from ahf_ros.drawing.overlay import DECODED_COLOUR, DECODING_DOT_COLOUR, draw
 from ahf_ros.features.homography import fit_homographies
 from ahf_ros.features.pyramid import image_pyramid
 from ahf_ros.synthetic.scene import Rendering
-from ahf_ros.target import UNDECODED, DottedTarget, Identification
 from support.scenes import around, counted, errors, relative_errors, rendering
 
 SIZE = {'family': 'gsi', 'width': 1000, 'height': 700, 'targets': 4, 'dot_radius': 6.0, 'seed': 3}

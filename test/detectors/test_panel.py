@@ -9,6 +9,7 @@ import cv2
 import numpy as np
 import pytest
 
+from ahf_ros.base.target import Truth
 from ahf_ros.detectors import DetectorSettings, create_detector
 from ahf_ros.detectors.ring.counting import estimate_count
 from ahf_ros.evaluation import FALSE, evaluate, judge, score, total
@@ -18,7 +19,6 @@ from ahf_ros.interchange.image_files import read_image
 from ahf_ros.interchange.tables import read_points
 from ahf_ros.interchange.target_json import read_results
 from ahf_ros.interchange.truth_files import read_truth
-from ahf_ros.target import Truth
 from support.command_line import ahf
 from support.exported import READERS
 from support.photographs import PANEL, WALL, needs_photographs

@@ -8,13 +8,13 @@ import cv2
 import numpy as np
 import pytest
 
+from ahf_ros.base.target import UNDECODED, Target
 from ahf_ros.codes.ring import family
 from ahf_ros.detectors import DetectorSettings, create_detector
 from ahf_ros.detectors.ring.refinement import refine_centres
 from ahf_ros.filtering.identifier import Identifier
 from ahf_ros.filtering.settings import AdaptiveSettings, GeneticSettings
 from ahf_ros.synthetic.scene import SceneSettings
-from ahf_ros.target import UNDECODED, Target
 from support.scenes import rendered
 
 SCENE = SceneSettings(width=700, height=500, targets=6, dot_radius=16.0, light='stripe', seed=3)

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from ahf_ros import detectors
+from ahf_ros.base.target import Target
 from ahf_ros.codes.families import KINDS
 from ahf_ros.detectors import (
     DETECTOR_NAMES,
@@ -28,7 +29,6 @@ from ahf_ros.detectors import (
 from ahf_ros.detectors.external.guarded import guarded
 from ahf_ros.session import identify
 from ahf_ros.session_settings import IdentificationSettings
-from ahf_ros.target import Target
 from support.packages import EXAMPLE, write_package
 from support.square_markers import needs_square_markers
 

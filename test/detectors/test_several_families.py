@@ -9,13 +9,13 @@ from functools import cache
 import numpy as np
 import pytest
 
+from ahf_ros.base.target import UNDECODED, Target
 from ahf_ros.codes import RING_NAMES
 from ahf_ros.codes.ring import family
 from ahf_ros.detectors import DetectorSettings, create_detector, estimator
 from ahf_ros.detectors.ring.choice import choose_families, further_families
 from ahf_ros.synthetic.covers import Cover, ink_cover
 from ahf_ros.synthetic.scene import Rendering, SceneSettings
-from ahf_ros.target import UNDECODED, Target
 from support.pictures.exposure import Exposure
 from support.pictures.sheets import mark_sheet
 from support.ring import measured

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from ahf_ros.base.target import Identification, Target
 from ahf_ros.batch.engine import SerialEngine
 from ahf_ros.batch.identification import identify_images
 from ahf_ros.batch.settling import settled_tasks
@@ -23,7 +24,6 @@ from ahf_ros.session import create_identifier
 from ahf_ros.session_settings import IdentificationSettings
 from ahf_ros.settling import evident, settled_families, still_shown
 from ahf_ros.synthetic.scene import SceneSettings
-from ahf_ros.target import Identification, Target
 from support.command_line import status
 from support.scenes import rendered
 from support.square_markers import needs_square_markers

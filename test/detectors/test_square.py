@@ -6,6 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
+from ahf_ros.base.target import Target
 from ahf_ros.codes import SQUARE_NAMES
 from ahf_ros.codes.square import marker, words
 from ahf_ros.detectors import Detector, create_detector
@@ -14,7 +15,6 @@ from ahf_ros.imaging.image import GAMMA
 from ahf_ros.session import identify
 from ahf_ros.settling import evident
 from ahf_ros.synthetic.scene import Rendering
-from ahf_ros.target import Target
 from support.pictures.textures import textured_image
 from support.scenes import around, counted, rendering
 from support.square_markers import needs_square_markers

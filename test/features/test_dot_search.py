@@ -135,7 +135,7 @@ def test_more_dots_than_are_looked_at_are_said_and_the_roundest_stay(monkeypatch
     edges = find_edges(log_image(drawn(dots, shape=(400, 400))))
     messages: list[str] = []
     log = SimpleNamespace(warning=lambda text, *values: messages.append(text % values))
-    monkeypatch.setattr('ahf_ros.notices._LOG', log)
+    monkeypatch.setattr('ahf_ros.base.notices._LOG', log)
     assert len(whole_outlines(edges, 4.0, 20.0).frames) == 100
     assert messages == []
     monkeypatch.setattr('ahf_ros.features.dot_search.MAXIMUM_OUTLINES', 30)

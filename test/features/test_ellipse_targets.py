@@ -7,8 +7,8 @@ from dataclasses import asdict
 
 import numpy as np
 
+from ahf_ros.base.target import UNDECODED, UndecodedTarget
 from ahf_ros.features.ellipse_targets import ellipse_fields, targets_from_frames
-from ahf_ros.target import UNDECODED, UndecodedTarget
 
 FRAMES = np.array([[[4.0, 0, 10], [0, 3, 20], [0, 0, 1]], [[5.0, 0, 30], [0, 5, 40], [0, 0, 1]]])
 COVARIANCE = np.tile(np.eye(2) * 0.01, (2, 1, 1))

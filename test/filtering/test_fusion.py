@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from ahf_ros.base.target import UNDECODED, Target
 from ahf_ros.filtering.identifier import Identifier
 from ahf_ros.filtering.settings import AdaptiveSettings, GeneticSettings
 from ahf_ros.filtering.trials import fused
-from ahf_ros.target import UNDECODED, Target
 
 
 def at(number: int, x: float, y: float = 50.0) -> Target:

@@ -7,6 +7,7 @@ from unittest.mock import Mock
 import numpy as np
 import pytest
 
+from ahf_ros.base.target import UNDECODED, Target, UndecodedTarget, count_codes
 from ahf_ros.filtering.genes import FIRST
 from ahf_ros.filtering.homomorphic import HomomorphicFilter, median_distance
 from ahf_ros.filtering.identifier import Identifier, is_mirrored
@@ -21,7 +22,6 @@ from ahf_ros.filtering.settings import (
 from ahf_ros.filtering.trials import CONFIRMED
 from ahf_ros.session import create_identifier
 from ahf_ros.synthetic.scene import SceneSettings, render
-from ahf_ros.target import UNDECODED, Target, UndecodedTarget, count_codes
 
 COUNT = 144
 SHORT = AdaptiveSettings(fusion=False, genetic=GeneticSettings(max_evaluations=30))

@@ -8,9 +8,9 @@ import cv2
 import numpy as np
 import pytest
 
+from ahf_ros.base.target import Target
 from ahf_ros.imaging.movement import Displacement, displacement, find_edges, targets_moved
 from ahf_ros.synthetic.scene import SceneSettings, render
-from ahf_ros.target import Target
 
 LARGE = {'width': 640, 'height': 480, 'targets': 6, 'dot_radius': 16.0, 'phases': 4, 'seed': 5}
 SMALL = {'width': 800, 'height': 600, 'dot_radius': 6.0}

@@ -8,13 +8,13 @@ import cv2
 import numpy as np
 import pytest
 
+from ahf_ros.base.target import Target
 from ahf_ros.interchange.camera_info import (
     Calibration,
     calibration,
     undistorted,
     undistorted_targets,
 )
-from ahf_ros.target import Target
 
 OWN = 'camera', 1936, 1296
 K = np.array([[1800.0, 0, 968], [0, 1790, 648], [0, 0, 1]])

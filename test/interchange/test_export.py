@@ -15,6 +15,7 @@ from types import ModuleType, SimpleNamespace
 import numpy as np
 import pytest
 
+from ahf_ros.base.target import UNDECODED, Target
 from ahf_ros.interchange.export.formats import FORMATS, Export
 from ahf_ros.interchange.export.survey import (
     Control,
@@ -23,7 +24,6 @@ from ahf_ros.interchange.export.survey import (
     notes_on,
     read_measured_images,
 )
-from ahf_ros.target import UNDECODED, Target
 from support.disk import room_for
 from support.exported import READERS
 

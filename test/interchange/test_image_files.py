@@ -11,9 +11,9 @@ import cv2
 import numpy as np
 import pytest
 
+from ahf_ros.base.extras import missing
 from ahf_ros.cli import main
 from ahf_ros.cli.identify import image_paths
-from ahf_ros.extras import missing
 from ahf_ros.imaging.headers import read_header
 from ahf_ros.interchange.exif import read_exif
 from ahf_ros.interchange.image_files import (

@@ -13,6 +13,7 @@ import cv2
 import numpy as np
 import pytest
 
+from ahf_ros.base.target import Identification, Target
 from ahf_ros.interchange.camera_files import opencv_yaml, read_camera, ros_yaml
 from ahf_ros.interchange.control_files import read_control, read_scale_bars
 from ahf_ros.interchange.exif import FILM_DIAGONAL, Exif, read_exif
@@ -22,7 +23,6 @@ from ahf_ros.interchange.observation_files import ObservedPhotograph, read_obser
 from ahf_ros.interchange.target_json import to_json
 from ahf_ros.orientation.camera import project
 from ahf_ros.orientation.network import CameraView, Network
-from ahf_ros.target import Identification, Target
 from support.networks import CALIBRATION
 
 NOTHING = CameraKnowledge({}, {}, {})

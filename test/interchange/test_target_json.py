@@ -10,10 +10,7 @@ import numpy as np
 import pytest
 
 from ahf_ros import SceneSettings, identify
-from ahf_ros.codes.families import prints_in
-from ahf_ros.detectors.ring.hypotheses import CERTAIN
-from ahf_ros.interchange.target_json import read_results, targets_from_json, to_json
-from ahf_ros.target import (
+from ahf_ros.base.target import (
     DottedTarget,
     FilterState,
     Identification,
@@ -22,6 +19,9 @@ from ahf_ros.target import (
     Target,
     UndecodedTarget,
 )
+from ahf_ros.codes.families import prints_in
+from ahf_ros.detectors.ring.hypotheses import CERTAIN
+from ahf_ros.interchange.target_json import read_results, targets_from_json, to_json
 from support.scenes import rendered
 
 CLOCKWISE = np.array([(np.cos(it), np.sin(it)) for it in np.radians(np.arange(0, 360, 30))])

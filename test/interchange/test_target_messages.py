@@ -9,6 +9,7 @@ from rclpy.serialization import deserialize_message, serialize_message
 from std_msgs.msg import Header
 
 from ahf_ros import msg
+from ahf_ros.base.target import UNDECODED, FilterState, Identification, SquareMarker, Target
 from ahf_ros.interchange.target_messages import (
     coded_target_array,
     identification_from,
@@ -16,7 +17,6 @@ from ahf_ros.interchange.target_messages import (
     unanswered,
 )
 from ahf_ros.msg import CodedTarget, CodedTargetArray
-from ahf_ros.target import UNDECODED, FilterState, Identification, SquareMarker, Target
 
 COVARIANCE = (1e-4, 0.0, 0.0, 4e-4)
 # Values that 32-bit numbers hold exactly.

@@ -10,9 +10,9 @@ pytest.importorskip('rclpy', reason='ROS 2 is not installed')
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 
+from ahf_ros.base.target import Identification, Target
 from ahf_ros.nodes.diagnostics import Diagnostics, Tally
 from ahf_ros.nodes.pipeline import IN_A_ROW, Shortfall
-from ahf_ros.target import Identification, Target
 from support.detector import values
 
 

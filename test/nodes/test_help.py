@@ -2,9 +2,9 @@ from __future__ import annotations
 
 import pytest
 
+from ahf_ros.base.settings.nested import flat_parameters
 from ahf_ros.nodes import start
 from ahf_ros.nodes.interfaces import NODES
-from ahf_ros.settings.nested import flat_parameters
 
 
 @pytest.fixture(autouse=True)

@@ -14,12 +14,12 @@ pytest.importorskip('rclpy', reason='ROS 2 is not installed')
 from sensor_msgs.msg import Image
 from std_msgs.msg import Header
 
+from ahf_ros.base.settings.nested import assemble
 from ahf_ros.nodes.diagnostics import Tally
 from ahf_ros.nodes.image_queue import ImageQueue, Worker
 from ahf_ros.nodes.messages import image_message
 from ahf_ros.nodes.pipeline import Pipeline
 from ahf_ros.nodes.settings import DetectorNodeSettings
-from ahf_ros.settings.nested import assemble
 
 PIXELS = np.tile(np.arange(40, dtype=np.uint8), (30, 1))
 

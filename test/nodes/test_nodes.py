@@ -23,10 +23,10 @@ from sensor_msgs.msg import CameraInfo, CompressedImage, Image
 from std_msgs.msg import Header
 from std_srvs.srv import Trigger
 
+from ahf_ros.base.settings.nested import flat_parameters
 from ahf_ros.msg import CodedTargetArray
 from ahf_ros.nodes.messages import image_message
 from ahf_ros.nodes.settings import DetectorNodeSettings
-from ahf_ros.settings.nested import flat_parameters
 from ahf_ros.synthetic.scene import Rendering, SceneSettings, render
 from support.detector import DetectorProcess, overrides, values
 

@@ -24,11 +24,11 @@ from sensor_msgs.msg import Image
 from std_msgs.msg import Header, String
 from test_nodes import ENDLESS
 
+from ahf_ros.base.settings.nested import flat_parameters
 from ahf_ros.msg import CodedTarget, CodedTargetArray
 from ahf_ros.nodes.messages import image_message
 from ahf_ros.nodes.process import Ending
 from ahf_ros.nodes.settings import DetectorNodeSettings
-from ahf_ros.settings.nested import flat_parameters
 from ahf_ros.srv import Identify
 from ahf_ros.synthetic.scene import SceneSettings, render
 from support import live

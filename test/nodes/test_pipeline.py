@@ -13,10 +13,10 @@ pytest.importorskip('rclpy', reason='ROS 2 is not installed')
 
 from std_msgs.msg import Header
 
+from ahf_ros.base.settings.nested import assemble
 from ahf_ros.nodes import pipeline
 from ahf_ros.nodes.messages import image_message
 from ahf_ros.nodes.settings import DetectorNodeSettings
-from ahf_ros.settings.nested import assemble
 from ahf_ros.stream import message_frame
 from ahf_ros.synthetic.scene import SceneSettings, render
 

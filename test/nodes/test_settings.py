@@ -6,9 +6,9 @@ import pytest
 
 pytest.importorskip('rclpy', reason='ROS 2 is not installed')
 
+from ahf_ros.base.settings.nested import flat_parameters
 from ahf_ros.nodes.parameters import unknown_parameters
 from ahf_ros.nodes.settings import AnswerSettings, DetectorNodeSettings, PoseNodeSettings
-from ahf_ros.settings.nested import flat_parameters
 
 KNOWN = [item.name for item in flat_parameters(DetectorNodeSettings)]
 

@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 
-from ahf_ros.target import SquareMarker
+from ahf_ros.base.target import SquareMarker
 from support.browser import opened
 from support.command_line import status
 from support.results import record, save_image, save_lines, searched, target, undecoded
@@ -229,7 +229,7 @@ def test_no_page_is_left_in_part(
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     with monkeypatch.context() as patch:
-        patch.setattr('ahf_ros.writing.os.fsync', full)
+        patch.setattr('ahf_ros.base.writing.os.fsync', full)
         assert report(results, '-o', page) == 1
     assert 'report.html cannot be written: No space left on device' in capsys.readouterr().err
     assert [it.name for it in page.parent.iterdir()] == ['report.html']

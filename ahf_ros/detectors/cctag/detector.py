@@ -16,7 +16,8 @@ from typing import ClassVar
 import cv2
 import numpy as np
 
-from ahf_ros.blas import one_blas_thread
+from ahf_ros.base.blas import one_blas_thread
+from ahf_ros.base.target import UNDECODED, Target, sorted_targets
 from ahf_ros.codes import CCTAG_NAMES
 from ahf_ros.codes.cctag import CircleFamily, circle_family
 from ahf_ros.detectors.cctag.glance import LARGEST, Circles, likely_rings
@@ -43,7 +44,6 @@ from ahf_ros.features.large_targets import targets_of_octaves
 from ahf_ros.features.log_edges import LogEdges, edges_in_bands
 from ahf_ros.features.pyramid import ImagePyramid, Octave, image_pyramid, octaves
 from ahf_ros.imaging.image import as_gray, check_image
-from ahf_ros.target import UNDECODED, Target, sorted_targets
 
 _COLOURS = 1, -1  # of circles that are looked for
 _SMALLEST, _SMALL = 2.0, 11.5  # radii of circles that are looked for, px, also in the half

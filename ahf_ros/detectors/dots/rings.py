@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from ahf_ros.base.target import UNDECODED, DottedTarget
 from ahf_ros.codes.dots import DotFamily
 from ahf_ros.detectors.claims import best_of_places
 from ahf_ros.detectors.contract import DetectorSettings
@@ -29,7 +30,6 @@ from ahf_ros.features.frame import ellipse_axes, mean_radii
 from ahf_ros.features.homography import local_frames
 from ahf_ros.features.logistic import logistic, read_weights
 from ahf_ros.features.pyramid import ImagePyramid
-from ahf_ros.target import UNDECODED, DottedTarget
 
 _RAYS = 40  # round each circle
 _REACH = 0.3  # how far from a circle its edge is looked for, radii of the disc: half the border

@@ -11,11 +11,11 @@ from typing import Any, Protocol, TypeVar
 
 import numpy as np
 
-from ahf_ros import ending
+from ahf_ros.base import ending
+from ahf_ros.base.target import Target
+from ahf_ros.base.target_check import checked_targets, checked_text
+from ahf_ros.base.text import reason_of
 from ahf_ros.detectors.contract import Detector, Drafter, Expecting, Refiner
-from ahf_ros.target import Target
-from ahf_ros.target_check import checked_targets, checked_text
-from ahf_ros.text import reason_of
 
 Result = TypeVar('Result')
 

@@ -17,7 +17,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from ahf_ros.blas import one_blas_thread
+from ahf_ros.base.blas import one_blas_thread
 from ahf_ros.codes import RING_NAMES
 from ahf_ros.codes.ring import Family, Radii
 from ahf_ros.detectors.claims import owners

@@ -15,10 +15,10 @@ from pathlib import Path
 
 import numpy as np
 
+from ahf_ros.base.opening import file_errors
 from ahf_ros.interchange.export.adjusted import lens_of, numbers
 from ahf_ros.interchange.export.survey import Survey
 from ahf_ros.interchange.files import csv_table
-from ahf_ros.opening import file_errors
 from ahf_ros.orientation.solution import Solution
 from ahf_ros.orientation.transform import Transform
 

@@ -12,7 +12,7 @@ from pathlib import Path, PurePath
 from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Literal
 
-from ahf_ros.writing import write_files
+from ahf_ros.base.writing import write_files
 
 if TYPE_CHECKING:
     from ahf_ros.interchange.export.survey import Control, MeasuredImage

@@ -14,7 +14,8 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from ahf_ros.blas import one_blas_thread
+from ahf_ros.base.blas import one_blas_thread
+from ahf_ros.base.target import Target, sorted_targets
 from ahf_ros.synthetic.bent import exposure
 from ahf_ros.synthetic.bent.grain import Grain
 from ahf_ros.synthetic.bent.ink import inked
@@ -29,7 +30,6 @@ from ahf_ros.synthetic.bent.scene import (
     drawn_sheets,
 )
 from ahf_ros.synthetic.bent.settings import BentSettings
-from ahf_ros.target import Target, sorted_targets
 
 _SAMPLES = 4  # rays per pixel along each axis, and finer ones per ray at edges of ink
 _STRIP = 64  # rows of pixels at a time, to bound the memory

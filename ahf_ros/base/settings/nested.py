@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
 from typing import Any, TypeVar, get_type_hints
 
-from ahf_ros.settings.parameter import Parameter, parameters
+from ahf_ros.base.settings.parameter import Parameter, parameters
 
 Settings = TypeVar('Settings')
 

@@ -19,9 +19,9 @@ from io import BytesIO
 from pathlib import Path
 from typing import IO, Any, TypeVar, cast
 
-from ahf_ros.extras import MissingExtra, need
-from ahf_ros.inputs import register_input
-from ahf_ros.text import reason_of
+from ahf_ros.base.extras import MissingExtra, need
+from ahf_ros.base.inputs import register_input
+from ahf_ros.base.text import reason_of
 
 Function = TypeVar('Function', bound=Callable[..., Any])
 

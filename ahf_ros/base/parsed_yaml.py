@@ -20,7 +20,7 @@ from ruamel.yaml.events import (
     ScalarEvent,
 )
 
-from ahf_ros.text import shown
+from ahf_ros.base.text import shown
 
 _DEEPEST = 20  # levels
 _WORDS = {'': None, '~': None, 'null': None, 'true': True, 'false': False}

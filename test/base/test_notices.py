@@ -6,12 +6,12 @@ from unittest.mock import Mock
 
 import pytest
 
-from ahf_ros.notices import said_once, tell_left_out
+from ahf_ros.base.notices import said_once, tell_left_out
 
 
 def test_what_is_left_out_is_said_once_of_an_image(monkeypatch: pytest.MonkeyPatch) -> None:
     log = Mock()
-    monkeypatch.setattr('ahf_ros.notices._LOG', log)
+    monkeypatch.setattr('ahf_ros.base.notices._LOG', log)
 
     @said_once()
     def look(times: int) -> None:

@@ -5,7 +5,7 @@ from dataclasses import FrozenInstanceError, dataclass
 import numpy as np
 import pytest
 
-from ahf_ros.settings.parameter import (
+from ahf_ros.base.settings.parameter import (
     Parameter,
     check_parameters,
     numbers_in,

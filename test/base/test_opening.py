@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from ahf_ros.opening import (
+from ahf_ros.base.opening import (
     LARGEST,
     check_regular,
     inside,

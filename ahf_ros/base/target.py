@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from typing import TYPE_CHECKING, Any, Protocol, overload
 
-from ahf_ros.extras import need
+from ahf_ros.base.extras import need
 
 if TYPE_CHECKING:
     import numpy as np

@@ -14,12 +14,12 @@ from functools import cache
 from numbers import Integral, Real
 from typing import Any
 
-from ahf_ros.text import shown
+from ahf_ros.base.text import shown
 
 MAXIMUM_NUMBERS = 100_000
 """Maximum count of numbers in a list."""
 
-_KEY = 'ahf_ros.settings.parameter'
+_KEY = 'ahf_ros.base.settings.parameter'
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,15 +15,15 @@ from hypothesis import strategies as st
 pytest.importorskip('rosbags', reason='rosbags is not installed')
 
 from ahf_ros.bag.definitions import CODED_TARGETS, message_types, typestore
+from ahf_ros.base.edge_shift import median_edge_shift
+from ahf_ros.base.target import Identification, Target
+from ahf_ros.base.target_check import checked_target, checked_targets
+from ahf_ros.base.text import printable, reason_of, shown
 from ahf_ros.detectors.external.guarded import guarded
 from ahf_ros.drawing.overlay import draw
-from ahf_ros.edge_shift import median_edge_shift
 from ahf_ros.interchange.target_json import to_json
 from ahf_ros.interchange.target_messages import coded_target_array
 from ahf_ros.session import create_identifier
-from ahf_ros.target import Identification, Target
-from ahf_ros.target_check import checked_target, checked_targets
-from ahf_ros.text import printable, reason_of, shown
 from support import bags
 
 NAMES = [item.name for item in fields(Target)]

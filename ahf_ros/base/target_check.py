@@ -16,8 +16,8 @@ from typing import Any
 
 import numpy as np
 
-from ahf_ros.target import UNDECODED, SquareMarker, Target
-from ahf_ros.text import shown
+from ahf_ros.base.target import UNDECODED, SquareMarker, Target
+from ahf_ros.base.text import shown
 
 MAXIMUM_ID = 2**31 - 1
 """Maximum ID, as in the message."""

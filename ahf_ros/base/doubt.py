@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping, Sequence
 
-from ahf_ros.target import UNDECODED, Target, UndecodedTarget
-from ahf_ros.text import counted, listed
+from ahf_ros.base.target import UNDECODED, Target, UndecodedTarget
+from ahf_ros.base.text import counted, listed
 
 DOUBTFUL_BELOW = 0.95
 """Confidence below which a decoded target counts as doubtful."""

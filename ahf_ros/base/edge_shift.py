@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from statistics import median
 
-from ahf_ros.target import UNDECODED, Target
+from ahf_ros.base.target import UNDECODED, Target
 
 NOTABLE_EDGE_SHIFTS = -0.5, 0.8
 """Edge shifts from which on an image is remarked on, px: too bright, and too dark.

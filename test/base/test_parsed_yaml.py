@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from ahf_ros.parsed_yaml import parsed_yaml
+from ahf_ros.base.parsed_yaml import parsed_yaml
 
 VALUES = {
     'null': None, '~': None, 'true': True, 'False': False, 'yes': 'yes', '017': 17, '-3': -3,

@@ -4,8 +4,8 @@ from dataclasses import dataclass, field
 
 import pytest
 
-from ahf_ros.settings.nested import assemble, flat_parameters
-from ahf_ros.settings.parameter import check_parameters, parameter
+from ahf_ros.base.settings.nested import assemble, flat_parameters
+from ahf_ros.base.settings.parameter import check_parameters, parameter
 
 
 @dataclass(frozen=True)

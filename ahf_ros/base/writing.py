@@ -4,7 +4,7 @@ A file is written beside its place, as a part that is safe on disk, and takes it
 step. The parts of a set are all there before the first of them takes its place. A list of them is
 there by then, too, so that whoever reads or writes the set next completes what a killed process
 has left. The main file of a set may have a manifest, by which readers see that the others are of
-the same run. No output takes the place of an input (`ahf_ros.inputs`).
+the same run. No output takes the place of an input (`ahf_ros.base.inputs`).
 
 Writes and `fsync` raise auditing events (PEP 578), as the functions of `os` do by themselves.
 """
@@ -23,9 +23,9 @@ from importlib import import_module
 from pathlib import Path, PurePath
 from typing import IO, Any, BinaryIO
 
-from ahf_ros.inputs import check_output
-from ahf_ros.opening import Most, file_errors, inside, opened
-from ahf_ros.text import shown
+from ahf_ros.base.inputs import check_output
+from ahf_ros.base.opening import Most, file_errors, inside, opened
+from ahf_ros.base.text import shown
 
 _fcntl: Any
 try:
