@@ -12,7 +12,7 @@ setup(
     packages=find_packages(include=['ahf_ros', 'ahf_ros.*']),
     package_data={
         '': ['*.json', 'py.typed'],
-        'ahf_ros.codes': ['ring_families/*'],
+        'ahf_ros.prints': ['ring_families/*'],
         'ahf_ros.interchange': ['html/*'],
         'ahf_ros.report': ['network_html/*', 'page/*'],
     },

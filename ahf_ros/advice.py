@@ -27,17 +27,17 @@ from ahf_ros.base.doubt import repeated_remark
 from ahf_ros.base.edge_shift import edge_shift_remark, median_edge_shift
 from ahf_ros.base.target import UNDECODED, Target, repeated_targets
 from ahf_ros.base.text import counted
-from ahf_ros.codes import SQUARE_NAMES
-from ahf_ros.codes.families import AUTO, prints_of
-from ahf_ros.codes.ring import FAMILY_NAMES, Family, words_of_print
-from ahf_ros.codes.square import has_dictionary
 from ahf_ros.detectors import Contesting, create_detector
 from ahf_ros.detectors.contract import DetectorSettings
+from ahf_ros.detectors.learning.rings import LearntFamily, learn_families
 from ahf_ros.detectors.ring.bands import DotsOfOctave, bands_about, dots_in
-from ahf_ros.detectors.ring.learning import LearntFamily, learn_families
 from ahf_ros.features.dot_search import whole_dots
 from ahf_ros.features.pyramid import MAXIMUM_RADIUS, image_pyramid
 from ahf_ros.imaging.image import as_gray, check_image
+from ahf_ros.prints import SQUARE_NAMES
+from ahf_ros.prints.families import AUTO, prints_of
+from ahf_ros.prints.ring import FAMILY_NAMES, Family, words_of_print
+from ahf_ros.prints.square import has_dictionary
 from ahf_ros.settling import evident, still_shown
 
 LOOKED_AT = 3

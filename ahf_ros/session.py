@@ -13,7 +13,6 @@ from ahf_ros.base.deprecation import deprecated_arguments
 from ahf_ros.base.settings.nested import updated
 from ahf_ros.base.target import Identification
 from ahf_ros.base.text import shown
-from ahf_ros.codes.families import AUTO
 from ahf_ros.detectors import (
     Contesting,
     Detector,
@@ -29,6 +28,7 @@ from ahf_ros.detectors import (
 from ahf_ros.filtering.identifier import Identifier
 from ahf_ros.filtering.trials import DetectorFunction
 from ahf_ros.imaging.stack import ImageStack
+from ahf_ros.prints.families import AUTO
 from ahf_ros.session_settings import IdentificationSettings
 from ahf_ros.settling import SettlingIdentifier
 

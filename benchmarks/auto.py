@@ -14,8 +14,8 @@ from itertools import product
 import numpy as np
 
 from ahf_ros.base.target import Target, TrueTarget
-from ahf_ros.codes.families import AUTO, FAMILY_NAMES, print_in
 from ahf_ros.evaluation import score, total
+from ahf_ros.prints.families import AUTO, FAMILY_NAMES, print_in
 from ahf_ros.session import identify
 from ahf_ros.synthetic.patterns import LIGHT_NAMES, benchmark_lights
 from ahf_ros.synthetic.scene import SceneSettings, render

@@ -23,9 +23,9 @@ from typing import Any
 
 import numpy as np
 
-from ahf_ros.codes.families import FAMILY_NAMES
 from ahf_ros.detectors import DETECTOR_NAMES
 from ahf_ros.evaluation import total
+from ahf_ros.prints.families import FAMILY_NAMES
 from ahf_ros.synthetic.bent.picture import render_bent
 from benchmarks import report
 from benchmarks.report import number

@@ -27,9 +27,6 @@ from typing import NamedTuple
 import numpy as np
 
 from ahf_ros.base.target import Target
-from ahf_ros.codes.dots import dot_family
-from ahf_ros.codes.gsi import point_family
-from ahf_ros.codes.ring import Family, canonical
 from ahf_ros.detectors import DetectorSettings
 from ahf_ros.detectors.dots import rings as dots
 from ahf_ros.detectors.dots.detector import find_rings
@@ -41,6 +38,9 @@ from ahf_ros.detectors.ring.detector import find_hypotheses
 from ahf_ros.detectors.ring.hypotheses import Hypotheses
 from ahf_ros.features.pyramid import image_pyramid
 from ahf_ros.imaging.image import as_gray
+from ahf_ros.prints.dots import dot_family
+from ahf_ros.prints.gsi import point_family
+from ahf_ros.prints.ring import Family, canonical
 from ahf_ros.synthetic.scene import Rendering, render
 from benchmarks import report
 from support.pictures.conditions import COMMON, FOREIGN, Scene, scenes

@@ -24,8 +24,8 @@ from dataclasses import replace
 from itertools import product
 from typing import Any
 
-from ahf_ros.codes.families import FAMILY_NAMES
 from ahf_ros.detectors import DETECTOR_NAMES
+from ahf_ros.prints.families import FAMILY_NAMES
 from ahf_ros.synthetic.patterns import LIGHT_NAMES
 from ahf_ros.synthetic.scene import SceneSettings, render
 from benchmarks import report

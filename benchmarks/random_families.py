@@ -17,11 +17,11 @@ from typing import Any
 
 import numpy as np
 
-from ahf_ros.codes.ring import Family, conforming, ring_family
 from ahf_ros.detectors import DetectorSettings, create_detector
+from ahf_ros.detectors.learning.rings import LearntFamily, learn_families
 from ahf_ros.detectors.ring.bands import find_bands
-from ahf_ros.detectors.ring.learning import LearntFamily, learn_families
 from ahf_ros.evaluation import Score, score, total
+from ahf_ros.prints.ring import Family, conforming, ring_family
 from benchmarks import report
 from benchmarks.report import table
 from support.pictures.drawn_families import LIGHTS, TARGETS, random_family, sheet

@@ -16,9 +16,6 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ahf_ros import ImageStack, SceneSettings, create_detector, create_identifier, render
-from ahf_ros.codes.designs import contours
-from ahf_ros.codes.families import print_in
-from ahf_ros.codes.ring import canonical, family
 from ahf_ros.detectors.contract import DetectorSettings
 from ahf_ros.detectors.ring.circles import REACH
 from ahf_ros.detectors.ring.decoding import Words, decode
@@ -39,8 +36,11 @@ from ahf_ros.features.sampling import sample, sample_circles
 from ahf_ros.filtering.homomorphic import HomomorphicFilter
 from ahf_ros.imaging.logarithm import logarithm
 from ahf_ros.imaging.stack import COMBINATIONS
-from ahf_ros.printing.drawing import Drawing, Ink
-from ahf_ros.printing.files import svg_bytes
+from ahf_ros.prints.designs import contours
+from ahf_ros.prints.families import print_in
+from ahf_ros.prints.printing.drawing import Drawing, Ink
+from ahf_ros.prints.printing.files import svg_bytes
+from ahf_ros.prints.ring import canonical, family
 from ahf_ros.synthetic.patterns import LIGHT_NAMES
 
 FOLDER = Path(__file__).resolve().parent.parent / 'docs' / 'pictures'

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ahf_ros.base.target import TrueTarget
-from ahf_ros.codes.families import print_in
+from ahf_ros.prints.families import print_in
 from ahf_ros.synthetic.layout import quiet_radius
 from ahf_ros.synthetic.scene import SceneSettings, render
 

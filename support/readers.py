@@ -18,11 +18,6 @@ import numpy as np
 
 from ahf_ros.base.extras import missing
 from ahf_ros.cli.identify import image_paths
-from ahf_ros.codes import RING_FOLDER
-from ahf_ros.codes.data_file import read_data_file
-from ahf_ros.codes.dots import DOTS_DESIGN, dot_family
-from ahf_ros.codes.gsi import GSI_LIBRARY, point_family
-from ahf_ros.codes.ring import ring_family
 from ahf_ros.interchange.arrays import read_arrays
 from ahf_ros.interchange.camera_files import read_camera
 from ahf_ros.interchange.cloud_files import read_cloud, write_pcd, write_ply
@@ -38,6 +33,11 @@ from ahf_ros.interchange.robot_files import read_robot_poses, read_stations
 from ahf_ros.interchange.tables import POINT, read_by_image, read_points, read_table
 from ahf_ros.interchange.target_json import read_results
 from ahf_ros.interchange.truth_files import read_truth
+from ahf_ros.prints import RING_FOLDER
+from ahf_ros.prints.data_file import read_data_file
+from ahf_ros.prints.dots import DOTS_DESIGN, dot_family
+from ahf_ros.prints.gsi import GSI_LIBRARY, point_family
+from ahf_ros.prints.ring import ring_family
 from ahf_ros.report.results import read_results as read_shown
 from support.networks import records, simulated, solution
 

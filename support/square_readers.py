@@ -8,9 +8,9 @@ import cv2
 import numpy as np
 
 from ahf_ros.base.target import Target
-from ahf_ros.codes.square import dictionary
 from ahf_ros.detectors import create_detector
 from ahf_ros.detectors.square.frames import centres
+from ahf_ros.prints.square import dictionary
 
 FAMILY = 'apriltag_36h11'
 

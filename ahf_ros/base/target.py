@@ -209,7 +209,7 @@ Truth = Mapping[str, Sequence[TrueTarget]]
 
 
 class FamilyRecord(Protocol):
-    """What results know of a family; `ahf_ros.codes.families.FamilyPrint` has all of its print."""
+    """What results know of a family; `prints.families.FamilyPrint` has all of its print."""
 
     @property
     def name(self) -> str:

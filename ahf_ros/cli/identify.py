@@ -39,8 +39,8 @@ from ahf_ros.cli.options import (
     output_path,
     settings_from,
 )
-from ahf_ros.codes.families import AUTO
 from ahf_ros.interchange.files import RESULTS_FILE
+from ahf_ros.prints.families import AUTO
 from ahf_ros.session_settings import IdentificationSettings, StackSettings
 
 if TYPE_CHECKING:

@@ -22,10 +22,10 @@ from ahf_ros.detectors.contract import DetectorSettings
 if TYPE_CHECKING:
     import numpy as np
 
-    from ahf_ros.codes.gsi import PointFamily
-    from ahf_ros.codes.gsi_learning import Learnt
+    from ahf_ros.detectors.learning.points import Learnt
+    from ahf_ros.detectors.learning.rings import LearntFamily
     from ahf_ros.detectors.ring.bands import Bands
-    from ahf_ros.detectors.ring.learning import LearntFamily
+    from ahf_ros.prints.gsi import PointFamily
 
 _OF_DOTS = 'polarity', 'min_radius', 'max_radius'  # options
 _COLUMNS, _TILE = 6, 180  # of the contact sheet, and width of a picture, px
@@ -95,8 +95,8 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _learn_rings(options: argparse.Namespace) -> int:
+    from ahf_ros.detectors.learning.rings import learn_families
     from ahf_ros.detectors.ring.bands import MINIMUM_TARGETS, Bands, find_bands
-    from ahf_ros.detectors.ring.learning import learn_families
     from ahf_ros.interchange.image_files import read_image
 
     paths, problems, left_out = image_paths(options.sources)
@@ -142,7 +142,7 @@ def _write_rings(
     """
     import cv2
 
-    from ahf_ros.codes.ring import ring_family
+    from ahf_ros.prints.ring import ring_family
 
     inner, outer = (round(radius, 2) for radius in learnt.band)
     count = len(learnt.words)
@@ -211,9 +211,9 @@ def _contact_sheet(learnt: LearntFamily, crops: dict[bytes, np.ndarray]) -> np.n
 
 
 def _learn_points(options: argparse.Namespace, points: str) -> int:
-    from ahf_ros.codes.gsi import point_family
-    from ahf_ros.codes.gsi_learning import learn_family, library_text, with_codes
+    from ahf_ros.detectors.learning.points import learn_family, library_text, with_codes
     from ahf_ros.interchange.tables import read_points
+    from ahf_ros.prints.gsi import point_family
 
     radius = options.dot_radius
     base = point_family(options.base)

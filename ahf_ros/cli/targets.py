@@ -8,9 +8,9 @@ from ahf_ros.base.text import counted
 from ahf_ros.base.writing import write_files, write_whole
 from ahf_ros.cli import say, tell
 from ahf_ros.cli.options import add_options, output_path, settings_from
-from ahf_ros.printing.files import geometry_text, sheet_files
-from ahf_ros.printing.settings import SheetSettings
-from ahf_ros.printing.sheets import Sheets
+from ahf_ros.prints.printing.files import geometry_text, sheet_files
+from ahf_ros.prints.printing.settings import SheetSettings
+from ahf_ros.prints.printing.sheets import Sheets
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

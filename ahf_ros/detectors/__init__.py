@@ -17,8 +17,6 @@ from ahf_ros.base.deprecation import deprecated_arguments
 from ahf_ros.base.settings.nested import updated
 from ahf_ros.base.settings.parameter import Parameter
 from ahf_ros.base.text import printable, reason_of, shown
-from ahf_ros.codes import SQUARE_NAMES
-from ahf_ros.codes.families import AUTO, FAMILY_NAMES, KINDS, FamilyPrint, check_numbers
 from ahf_ros.detectors.contract import (
     Contesting,
     Detector,
@@ -29,6 +27,8 @@ from ahf_ros.detectors.contract import (
     Narrowing,
     Refiner,
 )
+from ahf_ros.prints import SQUARE_NAMES
+from ahf_ros.prints.families import AUTO, FAMILY_NAMES, KINDS, FamilyPrint, check_numbers
 
 if TYPE_CHECKING:
     import numpy as np
@@ -192,8 +192,8 @@ def _several(settings: DetectorSettings) -> Detector:
 
     Of all families, those of square markers are left out that an old OpenCV does not have.
     """
-    from ahf_ros.codes.square import has_dictionary
     from ahf_ros.detectors.several import SeveralDetector
+    from ahf_ros.prints.square import has_dictionary
 
     groups: dict[str, list[str]] = {}
     for family, of in settings.prints.items():

@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING, Any, ClassVar, Protocol, TypeVar, runtime_chec
 
 from ahf_ros.base.settings.parameter import check_parameters, parameter
 from ahf_ros.base.target import Target
-from ahf_ros.codes.families import ACCEPTED, AUTO, FamilyPrint, prints_in
+from ahf_ros.prints.families import ACCEPTED, AUTO, FamilyPrint, prints_in
 
 if TYPE_CHECKING:
     import numpy as np
     from typing_extensions import Self
 
-    from ahf_ros.codes.prints import Print
     from ahf_ros.features.pyramid import ImagePyramid
+    from ahf_ros.prints.prints import Print
 
 Code = TypeVar('Code', bound='Print')
 """The prints of one kind."""
@@ -193,7 +193,7 @@ class DetectorSettings:
     Attributes
     ----------
     family : str
-        One of `ahf_ros.codes.families.FAMILY_NAMES`, several separated by commas, or 'auto' for
+        One of `ahf_ros.prints.families.FAMILY_NAMES`, several separated by commas, or 'auto' for
         all; `families` has them one by one.
     family_file : str
         Paths of data files, separated by commas, that describe more families, or the design in

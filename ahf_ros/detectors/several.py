@@ -17,7 +17,6 @@ from typing import ClassVar
 import numpy as np
 
 from ahf_ros.base.target import UNDECODED, DottedTarget, Prints, Target, reach_of, sorted_targets
-from ahf_ros.codes.families import AUTO
 from ahf_ros.detectors.claims import owners
 from ahf_ros.detectors.contract import (
     Contesting,
@@ -35,6 +34,7 @@ from ahf_ros.detectors.explained import without_targets
 from ahf_ros.features.common_search import CommonSearch
 from ahf_ros.features.pyramid import ImagePyramid, image_pyramid
 from ahf_ros.imaging.image import as_gray, check_image
+from ahf_ros.prints.families import AUTO
 
 _DIGITS = 2  # of a confidence, beyond which one is not surer than another
 

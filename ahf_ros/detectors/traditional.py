@@ -27,7 +27,6 @@ import numpy as np
 
 from ahf_ros.base.blas import one_blas_thread
 from ahf_ros.base.target import UNDECODED, Target, count_codes, sorted_targets
-from ahf_ros.codes.ring import Family
 from ahf_ros.detectors.claims import best_targets
 from ahf_ros.detectors.contract import DetectorSettings, FamilyDetector
 from ahf_ros.detectors.ring.circles import REACH, target_circles
@@ -39,6 +38,7 @@ from ahf_ros.features.frame import affine_frames, circle_points, ellipse_axes, p
 from ahf_ros.features.outlines import measured
 from ahf_ros.features.sampling import sample, within
 from ahf_ros.imaging.image import as_gray, check_image, stretched_to_8_bit
+from ahf_ros.prints.ring import Family
 
 _WINDOW = 80  # side of the square in which the threshold lies between the extremes, px
 _MINIMUM_CONTRAST = 20  # difference of those for there to be anything, gray values of 8 bit

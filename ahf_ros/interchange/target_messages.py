@@ -10,7 +10,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from ahf_ros.base.target import FilterState, Identification, SquareMarker, Target
-from ahf_ros.codes.square import corner_order
+from ahf_ros.prints.square import corner_order
 
 _TARGET_FIELDS = [it.name for it in fields(Target) if it.name != 'edge_shift']  # not sent
 _OF_LIBRARY = -1, 1, 1, 1, 1, -1, -1, -1  # corners of an upright marker as apriltag_msgs has them

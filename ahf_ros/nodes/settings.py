@@ -11,9 +11,9 @@ from ahf_ros.base.extras import missing
 from ahf_ros.base.settings.parameter import check_parameters, parameter
 from ahf_ros.base.text import printable, shown
 from ahf_ros.cloud_settings import MAXIMUM_TOLERANCE, CloudSettings
-from ahf_ros.codes.families import prints_of
 from ahf_ros.detectors import DETECTOR, detector_name
 from ahf_ros.nodes.patience import CONTINUOUS, TRIGGERED, UNKNOWN
+from ahf_ros.prints.families import prints_of
 from ahf_ros.registration_settings import RegistrationSettings, check_frame, unit_parameter
 from ahf_ros.session import create_identifier
 from ahf_ros.session_settings import IdentificationSettings, StackSettings

@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 import cv2
 import numpy as np
 
-from ahf_ros.codes.prints import Cells, Disc, Ring, Sectors, Shape
+from ahf_ros.prints.prints import Cells, Disc, Ring, Sectors, Shape
 
 _CELL = 32  # side of a cell in the picture of a square marker, px
 _SIDE = 256  # px of the picture of a distractor, finer than any in an image

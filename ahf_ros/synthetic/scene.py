@@ -13,9 +13,9 @@ import numpy as np
 from ahf_ros.base.blas import one_blas_thread
 from ahf_ros.base.settings.parameter import check_parameters, parameter
 from ahf_ros.base.target import Target, TrueTarget, sorted_targets
-from ahf_ros.codes.families import ONE, FamilyPrint, print_in
-from ahf_ros.codes.gsi import PointFamily
-from ahf_ros.codes.prints import Proportions
+from ahf_ros.prints.families import ONE, FamilyPrint, print_in
+from ahf_ros.prints.gsi import PointFamily
+from ahf_ros.prints.prints import Proportions
 from ahf_ros.synthetic.camera import Camera, Sensor, tilted_camera
 from ahf_ros.synthetic.covers import card_cover, distractor_cover, ink_cover
 from ahf_ros.synthetic.layout import (

@@ -17,9 +17,9 @@ from typing import NamedTuple
 import numpy as np
 
 from ahf_ros.base.target import Target, TrueTarget
-from ahf_ros.codes import RING_NAMES
-from ahf_ros.codes.ring import FAMILY_NAMES, family, ring_family
 from ahf_ros.detectors import DetectorSettings
+from ahf_ros.prints import RING_NAMES
+from ahf_ros.prints.ring import FAMILY_NAMES, family, ring_family
 from ahf_ros.synthetic.bent.picture import render_bent
 from ahf_ros.synthetic.patterns import LIGHT_NAMES, benchmark_lights
 from ahf_ros.synthetic.scene import SceneSettings, render

@@ -11,8 +11,8 @@ import cv2
 import numpy as np
 
 from ahf_ros.base.target import TrueTarget
-from ahf_ros.codes.cyclic import smallest_rotation
-from ahf_ros.codes.ring import FAMILY_NAMES, Family, family
+from ahf_ros.prints.cyclic import smallest_rotation
+from ahf_ros.prints.ring import FAMILY_NAMES, Family, family
 from support.pictures import occluders
 from support.pictures.exposure import Exposure
 from support.pictures.sheets import COLUMNS, Sheet, random_numbers, target_sheet

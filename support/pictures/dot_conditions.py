@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from ahf_ros.base.target import DottedTarget
-from ahf_ros.codes.gsi import GSI_LIBRARY, point_family
 from ahf_ros.detectors import create_detector
+from ahf_ros.prints.gsi import GSI_LIBRARY, point_family
 from ahf_ros.synthetic.patterns import LIGHT_NAMES
 from ahf_ros.synthetic.scene import Rendering, SceneSettings
 

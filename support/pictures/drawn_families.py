@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from ahf_ros.codes.cyclic import smallest_rotation
-from ahf_ros.codes.ring import conforming, ring_family
+from ahf_ros.prints.cyclic import smallest_rotation
+from ahf_ros.prints.ring import conforming, ring_family
 from ahf_ros.synthetic.scene import Rendering, SceneSettings, render
 
 RULES: tuple[dict[str, Any], ...] = (

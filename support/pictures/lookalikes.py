@@ -10,7 +10,7 @@ from dataclasses import replace
 import cv2
 import numpy as np
 
-from ahf_ros.codes.ring import BITS, Family, sectors
+from ahf_ros.prints.ring import BITS, Family, sectors
 from ahf_ros.synthetic.covers import Cover, ink_cover, stamp_cover
 from support.pictures.sheets import CELL, Ink
 

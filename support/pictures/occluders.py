@@ -8,7 +8,7 @@ from functools import partial
 
 import numpy as np
 
-from ahf_ros.codes.ring import family
+from ahf_ros.prints.ring import family
 from ahf_ros.synthetic.covers import ink_cover
 from support.pictures.exposure import GAMMA, INK, WHITE, Cell, Covered, Glare, Occluder
 

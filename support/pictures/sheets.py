@@ -15,9 +15,9 @@ import cv2
 import numpy as np
 
 from ahf_ros.base.target import TrueTarget
-from ahf_ros.codes.prints import Cells
-from ahf_ros.codes.ring import FAMILY_NAMES, family
-from ahf_ros.codes.square import CellPrint, dictionary
+from ahf_ros.prints.prints import Cells
+from ahf_ros.prints.ring import FAMILY_NAMES, family
+from ahf_ros.prints.square import CellPrint, dictionary
 from ahf_ros.synthetic.covers import Cover, ink_cover
 from support.pictures.exposure import GAMMA, INK, WHITE, Cell, Exposure
 

@@ -8,7 +8,7 @@ import cv2
 import pytest
 
 from ahf_ros import FAMILY_NAMES, SceneSettings, render
-from ahf_ros.codes.families import print_in
+from ahf_ros.prints.families import print_in
 from benchmarks import photographs
 from support import strangers
 

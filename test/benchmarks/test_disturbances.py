@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from ahf_ros.base.target import Target, TrueTarget
-from ahf_ros.codes.ring import FAMILY_NAMES, family
-from ahf_ros.codes.square import SQUARE_NAMES
+from ahf_ros.prints.ring import FAMILY_NAMES, family
+from ahf_ros.prints.square import SQUARE_NAMES
 from benchmarks import disturbances
 from support.pictures import occluders
 from support.pictures.disturbed import Targets

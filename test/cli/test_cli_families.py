@@ -9,8 +9,8 @@ import pytest
 
 from ahf_ros import SceneSettings, identify, render
 from ahf_ros.base.target import reach_of
-from ahf_ros.codes.dots import DOTS_DESIGN
-from ahf_ros.codes.families import files_by_name
+from ahf_ros.prints.dots import DOTS_DESIGN
+from ahf_ros.prints.families import files_by_name
 from ahf_ros.report.page import _reach
 from ahf_ros.report.results import result_from_json
 from support.command_line import status

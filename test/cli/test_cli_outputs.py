@@ -16,12 +16,12 @@ from ahf_ros.bag.definitions import IMAGE, typestore
 from ahf_ros.bag.registration import POINT_CLOUD
 from ahf_ros.cli import commands
 from ahf_ros.cli.options import input_files, input_name, input_path, output_path
-from ahf_ros.codes.gsi import point_family, positions_of
 from ahf_ros.interchange.cloud_files import write_ply
 from ahf_ros.interchange.files import csv_table
 from ahf_ros.interchange.image_files import write_image
 from ahf_ros.interchange.network_results import write_network
 from ahf_ros.interchange.truth_files import write_truth
+from ahf_ros.prints.gsi import point_family, positions_of
 from ahf_ros.synthetic.scene import render
 from support import ROOT, bags
 from support.command_line import ahf, status
@@ -117,7 +117,7 @@ def stage(tmp_path_factory: pytest.TempPathFactory) -> Path:
     made = tmp_path_factory.mktemp('stage')
     for name in ('photos', 'scans'):
         (made / name).mkdir()
-    shutil.copyfile(ROOT / 'ahf_ros' / 'codes' / 'gsi.json', made / 'gsi.json')
+    shutil.copyfile(ROOT / 'ahf_ros' / 'prints' / 'gsi.json', made / 'gsi.json')
     save_image(made / 'photos' / 'view_0.jpg')
     picture = render(SCENE).image
     write_image(made / 'scans' / 'a.png', picture)

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ahf_ros.codes import SQUARE_NAMES, VENDOR_NAMES
+from ahf_ros.prints import SQUARE_NAMES, VENDOR_NAMES
 from support.command_line import ahf, status
 from support.disk import room_for
 from support.printed import identified, largest_error, sample, settings_of

@@ -8,7 +8,6 @@ import cv2
 import numpy as np
 import pytest
 
-from ahf_ros.codes.ring import family
 from ahf_ros.detectors import DetectorSettings
 from ahf_ros.detectors.ring.appearance import unlike_print
 from ahf_ros.detectors.ring.confidence import COVERED
@@ -16,6 +15,7 @@ from ahf_ros.detectors.ring.decoding import Words
 from ahf_ros.detectors.ring.detector import find_hypotheses
 from ahf_ros.detectors.ring.polar import polar_images
 from ahf_ros.features.frame import ellipse_axes
+from ahf_ros.prints.ring import family
 from ahf_ros.synthetic.covers import Cover, ink_cover
 from ahf_ros.synthetic.scene import SceneSettings, render
 from support.pictures import occluders

@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ahf_ros.codes.ring import family
 from ahf_ros.detectors import DetectorSettings, create_detector
 from ahf_ros.detectors.ring.contests import among_others
 from ahf_ros.detectors.ring.detector import find_hypotheses
 from ahf_ros.detectors.ring.hypotheses import Hypotheses
+from ahf_ros.prints.ring import family
 from support.pictures.disturbed import Targets
 from support.pictures.exposure import Exposure
 from support.pictures.lookalikes import LOOKALIKES

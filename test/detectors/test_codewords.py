@@ -5,8 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ahf_ros.codes.cyclic import rotated_words
-from ahf_ros.codes.ring import canonical, family, sectors
 from ahf_ros.detectors.ring.codewords import (
     COMPETITORS,
     best_words,
@@ -14,6 +12,8 @@ from ahf_ros.detectors.ring.codewords import (
     margins,
     prior,
 )
+from ahf_ros.prints.cyclic import rotated_words
+from ahf_ros.prints.ring import canonical, family, sectors
 
 PHASES = 4
 

@@ -9,7 +9,6 @@ import cv2
 import numpy as np
 import pytest
 
-from ahf_ros.codes.ring import family
 from ahf_ros.detectors import DetectorSettings
 from ahf_ros.detectors.ring.confidence import WEIGHTS, confidence, features
 from ahf_ros.detectors.ring.decoding import DOUBT
@@ -17,6 +16,7 @@ from ahf_ros.detectors.ring.detector import find_hypotheses
 from ahf_ros.detectors.ring.hypotheses import CERTAIN
 from ahf_ros.detectors.ring.reading import read_bands
 from ahf_ros.features.logistic import read_weights
+from ahf_ros.prints.ring import family
 from support.ring import measured
 from support.scenes import SMALL, rendered, rendering
 

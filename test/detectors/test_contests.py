@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ahf_ros.codes.ring import family
 from ahf_ros.detectors.ring.confidence import rated
 from ahf_ros.detectors.ring.contests import resolve
 from ahf_ros.detectors.ring.decoding import Words
 from ahf_ros.detectors.ring.hypotheses import Hypotheses
+from ahf_ros.prints.ring import family
 from support.ring import made_up
 
 CODE = family('metashape12')

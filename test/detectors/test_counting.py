@@ -8,9 +8,9 @@ import cv2
 import numpy as np
 import pytest
 
-from ahf_ros.codes.ring import family
 from ahf_ros.detectors import DetectorSettings
 from ahf_ros.detectors.ring.counting import estimate_count
+from ahf_ros.prints.ring import family
 from ahf_ros.synthetic.scene import Rendering, SceneSettings
 from support.scenes import identified, rendered
 

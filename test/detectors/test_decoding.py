@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ahf_ros.codes.ring import FAMILY_NAMES, Family, canonical, family
 from ahf_ros.detectors.ring.decoding import Words, bits_at, decode, lengthened
 from ahf_ros.detectors.ring.likelihood import SURPRISES, Evidence
+from ahf_ros.prints.ring import FAMILY_NAMES, Family, canonical, family
 
 CODE = family('metashape12')
 PER_SECTOR = 10

@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 
 from ahf_ros.base.target import UNDECODED, DottedTarget
-from ahf_ros.codes.dots import DOTS_DESIGN, dot_family
 from ahf_ros.detectors import DetectorSettings, create_detector
 from ahf_ros.detectors.dots.detector import find_rings
 from ahf_ros.detectors.dots.discs import open_regions
 from ahf_ros.detectors.dots.rings import CERTAIN, WEIGHTS
 from ahf_ros.features.frame import ellipse_axes
 from ahf_ros.features.pyramid import image_pyramid
+from ahf_ros.prints.dots import DOTS_DESIGN, dot_family
 from ahf_ros.synthetic.scene import Rendering
 from support.scenes import counted, rendering
 

@@ -6,12 +6,12 @@ import cv2
 import numpy as np
 import pytest
 
-from ahf_ros.codes.ring import canonical, family
 from ahf_ros.detectors import DetectorSettings, create_detector
 from ahf_ros.detectors.ring.decoding import DOUBT
 from ahf_ros.detectors.ring.detector import find_hypotheses
 from ahf_ros.detectors.ring.hypotheses import Hypotheses
 from ahf_ros.detectors.square.reading import read
+from ahf_ros.prints.ring import canonical, family
 from support.scenes import rendering
 from support.square_markers import needs_square_markers
 

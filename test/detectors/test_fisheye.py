@@ -6,8 +6,8 @@ import cv2
 import numpy as np
 import pytest
 
-from ahf_ros.codes.ring import family
 from ahf_ros.detectors import create_detector
+from ahf_ros.prints.ring import family
 from support.ring import inked
 
 FOCAL_LENGTH, SIZE, RADIUS = 600.0, 1600, 20.0  # px; of a dot on the axis

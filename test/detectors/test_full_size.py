@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ahf_ros.codes import VENDOR_NAMES
 from ahf_ros.detectors import DetectorSettings
 from ahf_ros.detectors.ring.counting import estimate_count
 from ahf_ros.evaluation import score
+from ahf_ros.prints import VENDOR_NAMES
 from ahf_ros.synthetic.scene import SceneSettings, render
 from support.collage import Collage, collage
 from support.scenes import counts, identified

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ahf_ros.codes.cctag import circle_family
 from ahf_ros.detectors.cctag.glance import Circles, likely_rings
 from ahf_ros.features import frame
 from ahf_ros.features.dots import Dots
+from ahf_ros.prints.cctag import circle_family
 from ahf_ros.synthetic.scene import Rendering
 from support.scenes import rendering
 

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from ahf_ros.base.target import UNDECODED, DottedTarget, Identification
-from ahf_ros.codes.gsi import GSI_LIBRARY, point_family, positions_of, value_of
 from ahf_ros.detectors import create_detector
 from ahf_ros.detectors.gsi.evidence import (
     Evidence,
@@ -21,6 +20,7 @@ from ahf_ros.detectors.gsi.grouping import Templates
 from ahf_ros.drawing.overlay import DECODED_COLOUR, DECODING_DOT_COLOUR, draw
 from ahf_ros.features.homography import fit_homographies
 from ahf_ros.features.pyramid import image_pyramid
+from ahf_ros.prints.gsi import GSI_LIBRARY, point_family, positions_of, value_of
 from ahf_ros.synthetic.scene import Rendering
 from support.scenes import around, counted, errors, relative_errors, rendering
 

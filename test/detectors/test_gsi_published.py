@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from ahf_ros.base.target import DottedTarget
-from ahf_ros.codes.gsi import point_family
 from ahf_ros.detectors import create_detector
 from ahf_ros.detectors.gsi.published import decode
+from ahf_ros.prints.gsi import point_family
 from support.scenes import rendering
 
 GSI = point_family()

@@ -9,7 +9,6 @@ import pytest
 
 from ahf_ros import create_identifier
 from ahf_ros.base.target import Target
-from ahf_ros.codes.ring import family
 from ahf_ros.detectors import Expecting, create_detector
 from ahf_ros.detectors.external.guarded import guarded
 from ahf_ros.detectors.ring.hypotheses import Hypotheses
@@ -17,6 +16,7 @@ from ahf_ros.detectors.ring.known import NOTHING_KNOWN, Explained, Prior
 from ahf_ros.evaluation import RIGHT, WRONG, judge
 from ahf_ros.features import frame
 from ahf_ros.features.pyramid import Octave, image_pyramid, octaves
+from ahf_ros.prints.ring import family
 from support.drawn_dots import drawn, in_stripes
 from support.pictures import occluders
 from support.pictures.disturbed import far_apart

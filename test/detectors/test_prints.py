@@ -6,9 +6,9 @@ import cv2
 import numpy as np
 import pytest
 
-from ahf_ros.codes.square import words
 from ahf_ros.detectors.square.frames import SQUARE, Places, centres
 from ahf_ros.detectors.square.prints import lay_outlines, lay_prints
+from ahf_ros.prints.square import words
 from support.square_markers import needs_square_markers
 
 pytestmark = needs_square_markers

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 
 from ahf_ros import identify
-from ahf_ros.codes.ring import Family, canonical, family
+from ahf_ros.prints.ring import Family, canonical, family
 from support.ring import inked
 
 RADIUS, FINE = 17.0, 4  # of dots, px; rays across a pixel

@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ahf_ros.codes.ring import family
 from ahf_ros.detectors import DetectorSettings
 from ahf_ros.detectors.ring import detector, proposals
 from ahf_ros.detectors.ring.detector import find_hypotheses, report
@@ -17,6 +16,7 @@ from ahf_ros.detectors.ring.proposals import HOPEFUL, hopes, measure_alike, with
 from ahf_ros.features import frame
 from ahf_ros.features.circle_fit import Fit
 from ahf_ros.features.dots import Dots
+from ahf_ros.prints.ring import family
 from ahf_ros.synthetic.scene import SceneSettings, render
 from support.ring import lone_dot, measured
 

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from ahf_ros.base.target import UNDECODED, Target
-from ahf_ros.codes.ring import family
 from ahf_ros.detectors import DetectorSettings, create_detector
 from ahf_ros.detectors.ring.refinement import refine_centres
 from ahf_ros.filtering.identifier import Identifier
 from ahf_ros.filtering.settings import AdaptiveSettings, GeneticSettings
+from ahf_ros.prints.ring import family
 from ahf_ros.synthetic.scene import SceneSettings
 from support.scenes import rendered
 

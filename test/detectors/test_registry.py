@@ -13,7 +13,6 @@ import pytest
 
 from ahf_ros import detectors
 from ahf_ros.base.target import Target
-from ahf_ros.codes.families import KINDS
 from ahf_ros.detectors import (
     DETECTOR_NAMES,
     FAMILY_NAMES,
@@ -27,6 +26,7 @@ from ahf_ros.detectors import (
     estimator,
 )
 from ahf_ros.detectors.external.guarded import guarded
+from ahf_ros.prints.families import KINDS
 from ahf_ros.session import identify
 from ahf_ros.session_settings import IdentificationSettings
 from support.packages import EXAMPLE, write_package

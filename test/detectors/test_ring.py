@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 
 from ahf_ros.base.target import UNDECODED, TrueTarget
-from ahf_ros.codes.ring import FAMILY_NAMES, family
 from ahf_ros.detectors import DetectorSettings, create_detector
 from ahf_ros.detectors.ring.counting import estimate_count
 from ahf_ros.detectors.ring.detector import find_hypotheses, read_image
 from ahf_ros.detectors.ring.refinement import refine_centres
 from ahf_ros.evaluation import score
+from ahf_ros.prints.ring import FAMILY_NAMES, family
 from ahf_ros.synthetic.scene import SceneSettings
 from support.pictures import occluders
 from support.pictures.exposure import Exposure

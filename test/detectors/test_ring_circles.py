@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ahf_ros.codes.ring import family
 from ahf_ros.detectors.ring.circles import target_circles
+from ahf_ros.prints.ring import family
 
 CODE = family('metashape12')
 

@@ -9,8 +9,8 @@ import cv2
 import numpy as np
 import pytest
 
-from ahf_ros.codes.ring import FAMILY_NAMES
 from ahf_ros.detectors import create_detector
+from ahf_ros.prints.ring import FAMILY_NAMES
 from support.scenes import SMALL, counts, errors_of, rendered, scored
 
 SCENES = [('ring', 'normal'), ('ring', 'stripe'), ('traditional', 'normal')]

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from ahf_ros.base.target import UNDECODED, Target
-from ahf_ros.codes import RING_NAMES
-from ahf_ros.codes.ring import family
 from ahf_ros.detectors import DetectorSettings, create_detector, estimator
 from ahf_ros.detectors.ring.choice import choose_families, further_families
+from ahf_ros.prints import RING_NAMES
+from ahf_ros.prints.ring import family
 from ahf_ros.synthetic.covers import Cover, ink_cover
 from ahf_ros.synthetic.scene import Rendering, SceneSettings
 from support.pictures.exposure import Exposure

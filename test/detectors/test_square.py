@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from ahf_ros.base.target import Target
-from ahf_ros.codes import SQUARE_NAMES
-from ahf_ros.codes.square import marker, words
 from ahf_ros.detectors import Detector, create_detector
 from ahf_ros.evaluation import score
 from ahf_ros.imaging.image import GAMMA
+from ahf_ros.prints import SQUARE_NAMES
+from ahf_ros.prints.square import marker, words
 from ahf_ros.session import identify
 from ahf_ros.settling import evident
 from ahf_ros.synthetic.scene import Rendering

@@ -19,9 +19,9 @@ from ahf_ros.base.target import (
     Target,
     UndecodedTarget,
 )
-from ahf_ros.codes.families import prints_in
 from ahf_ros.detectors.ring.hypotheses import CERTAIN
 from ahf_ros.interchange.target_json import read_results, targets_from_json, to_json
+from ahf_ros.prints.families import prints_in
 from support.scenes import rendered
 
 CLOCKWISE = np.array([(np.cos(it), np.sin(it)) for it in np.radians(np.arange(0, 360, 30))])

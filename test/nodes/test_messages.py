@@ -20,7 +20,6 @@ from visualization_msgs.msg import ImageMarker, Marker
 
 from ahf_ros import msg
 from ahf_ros.base.target import UNDECODED, Identification, Target
-from ahf_ros.codes.square import marker
 from ahf_ros.detectors import create_detector
 from ahf_ros.interchange.point_clouds import COVARIANCE
 from ahf_ros.interchange.target_messages import coded_target_array
@@ -41,6 +40,7 @@ from ahf_ros.nodes.messages import (
 )
 from ahf_ros.orientation.camera import rotation_matrices
 from ahf_ros.orientation.transform import Transform
+from ahf_ros.prints.square import marker
 
 SEEN = Target(18, 71, 100.0, 50.0, 20.0, 10.0, math.pi / 2, confidence=0.75)
 LOST = Target(UNDECODED, 0, 10.0, 20.0, 5.0, 5.0)

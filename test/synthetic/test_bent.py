@@ -9,8 +9,8 @@ import cv2
 import numpy as np
 import pytest
 
-from ahf_ros.codes.designs import circle, contours
-from ahf_ros.codes.families import FAMILY_NAMES, print_in
+from ahf_ros.prints.designs import circle, contours
+from ahf_ros.prints.families import FAMILY_NAMES, print_in
 from ahf_ros.synthetic.bent import exposure
 from ahf_ros.synthetic.bent.ink import inked
 from ahf_ros.synthetic.bent.lens import Lens

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from ahf_ros.base.target import Target
-from ahf_ros.codes.ring import family
+from ahf_ros.prints.ring import family
 from ahf_ros.synthetic.scene import Rendering, SceneSettings, render
 
 SMALL = SceneSettings(width=480, height=360, targets=6, dot_radius=12.0)

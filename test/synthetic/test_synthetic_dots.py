@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 from ahf_ros.cli import main
-from ahf_ros.codes.dots import dot_family
-from ahf_ros.codes.families import print_in
-from ahf_ros.codes.gsi import GSI_LIBRARY, point_family
-from ahf_ros.codes.ring import family
 from ahf_ros.interchange.truth_files import read_truth
+from ahf_ros.prints.dots import dot_family
+from ahf_ros.prints.families import print_in
+from ahf_ros.prints.gsi import GSI_LIBRARY, point_family
+from ahf_ros.prints.ring import family
 from ahf_ros.synthetic.camera import Camera, tilted_camera
 from ahf_ros.synthetic.covers import ink_cover
 from ahf_ros.synthetic.prints import Mark, print_mark

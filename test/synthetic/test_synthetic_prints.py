@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 import pytest
 
-from ahf_ros.codes.ring import family
+from ahf_ros.prints.ring import family
 from ahf_ros.synthetic import prints
 from ahf_ros.synthetic.camera import Camera, tilted_camera
 from ahf_ros.synthetic.covers import Cover, distractor_cover, ink_cover

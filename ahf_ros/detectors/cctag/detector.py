@@ -18,8 +18,6 @@ import numpy as np
 
 from ahf_ros.base.blas import one_blas_thread
 from ahf_ros.base.target import UNDECODED, Target, sorted_targets
-from ahf_ros.codes import CCTAG_NAMES
-from ahf_ros.codes.cctag import CircleFamily, circle_family
 from ahf_ros.detectors.cctag.glance import LARGEST, Circles, likely_rings
 from ahf_ros.detectors.cctag.joint import contested, jointly
 from ahf_ros.detectors.cctag.light import EDGES, Lights, shares_alike
@@ -44,6 +42,8 @@ from ahf_ros.features.large_targets import targets_of_octaves
 from ahf_ros.features.log_edges import LogEdges, edges_in_bands
 from ahf_ros.features.pyramid import ImagePyramid, Octave, image_pyramid, octaves
 from ahf_ros.imaging.image import as_gray, check_image
+from ahf_ros.prints import CCTAG_NAMES
+from ahf_ros.prints.cctag import CircleFamily, circle_family
 
 _COLOURS = 1, -1  # of circles that are looked for
 _SMALLEST, _SMALL = 2.0, 11.5  # radii of circles that are looked for, px, also in the half

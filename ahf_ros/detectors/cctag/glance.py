@@ -13,7 +13,6 @@ from functools import lru_cache
 
 import numpy as np
 
-from ahf_ros.codes.cctag import CircleFamily
 from ahf_ros.detectors.cctag.rays import ANGLES, PROFILE
 from ahf_ros.detectors.cctag.templates import (
     CLIPPED,
@@ -30,6 +29,7 @@ from ahf_ros.features import frame
 from ahf_ros.features.array_record import ArrayRecord
 from ahf_ros.features.dots import Dots
 from ahf_ros.features.sampling import sample_circles
+from ahf_ros.prints.cctag import CircleFamily
 
 _EVERY = 2  # one of so many angles and radii is looked at
 _EDGES: tuple[Edge, ...] = (

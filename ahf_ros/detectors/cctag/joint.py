@@ -13,8 +13,6 @@ from operator import itemgetter
 
 import numpy as np
 
-from ahf_ros.codes import CCTAG_NAMES
-from ahf_ros.codes.cctag import CircleFamily, circle_family
 from ahf_ros.detectors.cctag.fit import Fit, Usual, fitted
 from ahf_ros.detectors.cctag.light import EDGES, Lights
 from ahf_ros.detectors.cctag.patch import Patch
@@ -22,6 +20,8 @@ from ahf_ros.detectors.cctag.rings import Aligned, Prior, align, likely_ids
 from ahf_ros.detectors.cctag.templates import MAXIMUM_SHIFT, signed_circles
 from ahf_ros.features import frame
 from ahf_ros.imaging.image import GAMMA, as_light
+from ahf_ros.prints import CCTAG_NAMES
+from ahf_ros.prints.cctag import CircleFamily, circle_family
 
 _LARGEST = 32.0  # px: rays place the rings of larger targets as well, and much faster
 _TELLING = 16  # targets that tell what is usual

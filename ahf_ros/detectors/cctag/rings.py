@@ -14,7 +14,6 @@ from itertools import product
 
 import numpy as np
 
-from ahf_ros.codes.cctag import CircleFamily
 from ahf_ros.detectors.cctag.light import EDGES, Lights, lit
 from ahf_ros.detectors.cctag.rays import (
     ALONG,
@@ -43,6 +42,7 @@ from ahf_ros.features.logistic import logistic
 from ahf_ros.features.normal import normal_integral
 from ahf_ros.features.robust import NORMAL
 from ahf_ros.imaging.image import as_light
+from ahf_ros.prints.cctag import CircleFamily
 
 _TRIED_SHIFTS = -1.2, -0.6, 0.0, 0.6, 1.2  # deviations
 _TRIED_BLURS, _TRIED_SHARPENINGS = (-1.0, 0.0, 1.4), (3.0, 7.0)  # the same

@@ -14,7 +14,6 @@ from dataclasses import replace
 import cv2
 import numpy as np
 
-from ahf_ros.codes.dots import DotFamily
 from ahf_ros.detectors.contract import DetectorSettings
 from ahf_ros.features.common_search import BLOBS
 from ahf_ros.features.dot_search import voted_dots, whole_dots
@@ -25,6 +24,7 @@ from ahf_ros.features.pyramid import ImagePyramid
 from ahf_ros.features.robust import medians
 from ahf_ros.features.sampling import sample_circles
 from ahf_ros.features.small_dots import BLURRED, LARGEST, small_dots, small_dots_in
+from ahf_ros.prints.dots import DotFamily
 
 _STRAIGHT = 8.0  # length of an edge that is no small dot's, px of the image at half its size
 _TILE = 64  # side, px of the image at half its size

@@ -17,7 +17,6 @@ from typing import Any
 import numpy as np
 
 from ahf_ros.base.target import UNDECODED, DottedTarget
-from ahf_ros.codes.dots import DotFamily
 from ahf_ros.detectors.claims import best_of_places
 from ahf_ros.detectors.contract import DetectorSettings
 from ahf_ros.detectors.dots.reading import Readings, dot_points, expecting, read_rings
@@ -30,6 +29,7 @@ from ahf_ros.features.frame import ellipse_axes, mean_radii
 from ahf_ros.features.homography import local_frames
 from ahf_ros.features.logistic import logistic, read_weights
 from ahf_ros.features.pyramid import ImagePyramid
+from ahf_ros.prints.dots import DotFamily
 
 _RAYS = 40  # round each circle
 _REACH = 0.3  # how far from a circle its edge is looked for, radii of the disc: half the border

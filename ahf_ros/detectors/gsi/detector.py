@@ -18,7 +18,6 @@ import numpy as np
 
 from ahf_ros.base.blas import one_blas_thread
 from ahf_ros.base.target import UNDECODED, DottedTarget, Target, sorted_targets
-from ahf_ros.codes.gsi import PointFamily
 from ahf_ros.detectors.claims import reported
 from ahf_ros.detectors.contract import DetectorSettings, FamilyDetector, moved_targets
 from ahf_ros.detectors.gsi.evidence import find_evidence, likely_templates, read_codes
@@ -53,6 +52,7 @@ from ahf_ros.features.large_targets import targets_of_octaves
 from ahf_ros.features.pyramid import ImagePyramid, Octave, image_pyramid
 from ahf_ros.features.small_dots import small_dots_in
 from ahf_ros.imaging.image import as_gray, check_image
+from ahf_ros.prints.gsi import PointFamily
 
 _MARGIN = 0.5  # about the dots of certain targets, dot radii
 _WHOLE_MARGIN = 0.4  # about a dot whose outline is whole, dot radii

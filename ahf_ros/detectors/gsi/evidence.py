@@ -11,7 +11,6 @@ from functools import lru_cache
 
 import numpy as np
 
-from ahf_ros.codes.gsi import PointFamily
 from ahf_ros.detectors.expected import against
 from ahf_ros.detectors.gsi.grouping import Templates
 from ahf_ros.features.array_record import ArrayRecord
@@ -21,6 +20,7 @@ from ahf_ros.features.homography import local_frames
 from ahf_ros.features.robust import median
 from ahf_ros.imaging.black import black_lift, lifted
 from ahf_ros.imaging.logarithm import LOG_OFFSET
+from ahf_ros.prints.gsi import PointFamily
 
 _MINIMUM_STEP = 0.12  # step of ln of a dot
 _MINIMUM_DARK_STEP = 0.02  # the same where there is hardly any light

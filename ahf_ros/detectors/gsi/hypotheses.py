@@ -11,7 +11,6 @@ from pathlib import Path
 
 import numpy as np
 
-from ahf_ros.codes.gsi import PointFamily
 from ahf_ros.detectors.claims import Rivals, owners
 from ahf_ros.detectors.gsi.evidence import Readings
 from ahf_ros.detectors.gsi.grouping import Templates
@@ -20,6 +19,7 @@ from ahf_ros.features.array_record import ArrayRecord
 from ahf_ros.features.frame import ellipse_axes
 from ahf_ros.features.homography import reference_frames
 from ahf_ros.features.logistic import logistic, read_weights
+from ahf_ros.prints.gsi import PointFamily
 
 WEIGHTS = Path(__file__).with_name('fitted_weights.json')
 CERTAIN = 0.95  # confidence from which a target is reported

@@ -18,8 +18,6 @@ from functools import lru_cache
 import numpy as np
 
 from ahf_ros.base.blas import one_blas_thread
-from ahf_ros.codes import RING_NAMES
-from ahf_ros.codes.ring import Family, Radii
 from ahf_ros.detectors.claims import owners
 from ahf_ros.detectors.contract import DetectorSettings
 from ahf_ros.detectors.ring.polar import angles_of
@@ -32,6 +30,8 @@ from ahf_ros.features.pyramid import Octave, image_pyramid, octaves
 from ahf_ros.features.robust import NORMAL, median
 from ahf_ros.features.sampling import sample_circles
 from ahf_ros.imaging.image import as_gray, as_light, check_image
+from ahf_ros.prints import RING_NAMES
+from ahf_ros.prints.ring import Family, Radii
 
 MINIMUM_TARGETS = 5
 """Targets of a family from which it is learnt; twenty tell it well."""

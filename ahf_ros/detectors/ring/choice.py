@@ -11,7 +11,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ahf_ros.codes.ring import Family
 from ahf_ros.detectors.ring.decoding import DOUBT
 from ahf_ros.detectors.ring.families import contested, present_families, words_shown
 from ahf_ros.detectors.ring.hypotheses import Hypotheses
@@ -19,6 +18,7 @@ from ahf_ros.detectors.ring.proposals import HOPEFUL, Print, bounds, measure_lik
 from ahf_ros.detectors.ring.reading import read_bands
 from ahf_ros.detectors.ring.rivals import has_all
 from ahf_ros.features.circle_fit import ENOUGH, Fit
+from ahf_ros.prints.ring import Family
 
 _CLEAREST = 32  # dots that tell the family of an image
 _OTHERS = 2048  # clearest ones of the others: texture and letters have thousands

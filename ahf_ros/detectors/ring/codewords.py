@@ -6,8 +6,8 @@ from functools import cache, lru_cache
 
 import numpy as np
 
-from ahf_ros.codes.cyclic import rotated_words
-from ahf_ros.codes.ring import Family
+from ahf_ros.prints.cyclic import rotated_words
+from ahf_ros.prints.ring import Family
 
 _EXHAUSTIVE = 50_000  # rotations of words, up to which all of them compete
 _MINIMUM_EVIDENCE = 0.5  # for ones, in units of ln

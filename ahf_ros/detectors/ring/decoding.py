@@ -13,11 +13,11 @@ from functools import lru_cache
 
 import numpy as np
 
-from ahf_ros.codes.ring import Family, canonical
 from ahf_ros.detectors.ring.codewords import best_words, likeliest_bits, margins, prior
 from ahf_ros.detectors.ring.likelihood import SURPRISES, Evidence
 from ahf_ros.features.array_record import ArrayRecord
 from ahf_ros.features.normal import normal_integral
+from ahf_ros.prints.ring import Family, canonical
 
 _MAXIMUM_READING = 5.0  # for or against a word
 _LIKE_PAPER = 8.5  # the same of something that looks like paper

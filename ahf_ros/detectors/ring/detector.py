@@ -15,7 +15,6 @@ import numpy as np
 
 from ahf_ros.base.blas import one_blas_thread
 from ahf_ros.base.target import Target, sorted_targets
-from ahf_ros.codes.ring import Family
 from ahf_ros.detectors.contract import DetectorSettings, FamilyDetector
 from ahf_ros.detectors.ring.bands import with_measured_bands
 from ahf_ros.detectors.ring.choice import choose_families, further_families
@@ -46,6 +45,7 @@ from ahf_ros.features.ellipse_targets import targets_from_frames
 from ahf_ros.features.pyramid import ImagePyramid, Octave, image_pyramid, octaves
 from ahf_ros.imaging.faint import faint_parts
 from ahf_ros.imaging.image import as_gray, check_image
+from ahf_ros.prints.ring import Family
 
 _PART = 128  # dots of one colour that are read at a time
 _IN_PLACE, _EXACT = 0.6, 0.5  # edges of a dot: least share of them, largest deviation, px

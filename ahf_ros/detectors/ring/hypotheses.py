@@ -6,12 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ahf_ros.codes.ring import Family
 from ahf_ros.detectors.ring.decoding import Words
 from ahf_ros.features import frame
 from ahf_ros.features.array_record import ArrayRecord
 from ahf_ros.features.circle_fit import Fit
 from ahf_ros.features.growth import growth_in_light
+from ahf_ros.prints.ring import Family
 
 CERTAIN = 0.75
 """Confidence from which words are reported."""

@@ -16,7 +16,6 @@ from functools import lru_cache
 
 import numpy as np
 
-from ahf_ros.codes.ring import Family, least_marked
 from ahf_ros.detectors.ring.circles import RAYS, REACH
 from ahf_ros.detectors.ring.known import Explained
 from ahf_ros.detectors.ring.likelihood import FEW_MARKS, band_edges, edge_evidence, growth_by
@@ -35,6 +34,7 @@ from ahf_ros.features.dots import NO_DOTS, Dots
 from ahf_ros.features.pyramid import Octave
 from ahf_ros.features.robust import medians
 from ahf_ros.features.small_dots import small_dots_in
+from ahf_ros.prints.ring import Family, least_marked
 
 _MOST_ALIKE = 64  # dots in the shapes of targets that are looked at
 _THIN = 4.0  # semi-minor axis of a dot whose gap edges of a half may not show, px

@@ -12,7 +12,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from ahf_ros.codes.ring import Family, least_marked
 from ahf_ros.detectors.ring.appearance import unlike_print
 from ahf_ros.detectors.ring.borders import with_ends
 from ahf_ros.detectors.ring.circles import reach_of, target_circles
@@ -45,6 +44,7 @@ from ahf_ros.features import frame
 from ahf_ros.features.circle_fit import ENOUGH, Fit, fit_circles
 from ahf_ros.features.sampling import sample_circles
 from ahf_ros.imaging.black import lifted
+from ahf_ros.prints.ring import Family, least_marked
 
 PER_SECTOR = 10
 """Angles of a sector at which bands are read."""

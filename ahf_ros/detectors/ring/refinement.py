@@ -12,7 +12,6 @@ from dataclasses import replace
 import numpy as np
 
 from ahf_ros.base.target import UNDECODED, Target
-from ahf_ros.codes.ring import Family, canonical
 from ahf_ros.detectors.ring.bands import with_measured_bands
 from ahf_ros.detectors.ring.circles import RAYS, REACH
 from ahf_ros.detectors.ring.full_size import with_soft_edges
@@ -23,6 +22,7 @@ from ahf_ros.features import frame
 from ahf_ros.features.circle_fit import ENOUGH, Fit, fit_dots
 from ahf_ros.features.ellipse_targets import ellipse_fields
 from ahf_ros.imaging.image import as_gray, check_image
+from ahf_ros.prints.ring import Family, canonical
 
 _MAXIMUM_MOVE, _MAXIMUM_MOVE_SHARE = 1.0, 0.2  # that a centre is moved: px, or radii of its dot
 

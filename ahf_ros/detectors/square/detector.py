@@ -15,7 +15,6 @@ import numpy as np
 
 from ahf_ros.base.blas import one_blas_thread
 from ahf_ros.base.target import SquareMarker, Target, sorted_targets
-from ahf_ros.codes.square import are_plain, words
 from ahf_ros.detectors.claims import Rivals, owners
 from ahf_ros.detectors.contract import FamilyDetector, moved_targets
 from ahf_ros.detectors.square.edges import fit_edges
@@ -28,6 +27,7 @@ from ahf_ros.detectors.undecoded import undecoded
 from ahf_ros.features.frame import reduced
 from ahf_ros.features.pyramid import halved
 from ahf_ros.imaging.image import as_gray, check_image
+from ahf_ros.prints.square import are_plain, words
 
 # Of a centre from contours where nothing else can be fitted, in sides: on paper with waves of 0.5
 # to 3 px, 0.021 of 169 markers and 0.032 of 85, none beyond three of these. On flat and on bent

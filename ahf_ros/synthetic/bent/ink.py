@@ -8,7 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from ahf_ros.codes.designs import Arc, Contour, Point
+from ahf_ros.prints.designs import Arc, Contour, Point
 
 
 def inked(contours: Sequence[Contour], x: np.ndarray, y: np.ndarray) -> np.ndarray:

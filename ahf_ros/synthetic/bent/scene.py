@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 
 from ahf_ros.base.target import Target
-from ahf_ros.codes.designs import Contour, circle, contours
+from ahf_ros.prints.designs import Contour, circle, contours
 from ahf_ros.synthetic.bent.lens import Lens
 from ahf_ros.synthetic.bent.settings import BentSettings, sheet_grid
 from ahf_ros.synthetic.bent.sheet import Sheet

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field, fields
 from typing import Any
 
 from ahf_ros.base.settings.parameter import check_parameters, parameter
-from ahf_ros.codes.families import FamilyPrint, print_in
-from ahf_ros.codes.prints import Proportions
+from ahf_ros.prints.families import FamilyPrint, print_in
+from ahf_ros.prints.prints import Proportions
 from ahf_ros.synthetic.layout import finest_grid, quiet_radius
 from ahf_ros.synthetic.scene import SceneSettings, check_distortion
 

@@ -7,7 +7,7 @@ from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 
-from ahf_ros.codes.prints import Print
+from ahf_ros.prints.prints import Print
 
 Words = TypeVar('Words', int, np.ndarray)
 

@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ahf_ros.codes import RING_NAMES
-from ahf_ros.codes.cyclic import smallest_rotation
-from ahf_ros.codes.ring import (
+from ahf_ros.prints import RING_NAMES
+from ahf_ros.prints.cyclic import smallest_rotation
+from ahf_ros.prints.ring import (
     FAMILY_NAMES,
     Family,
     family,

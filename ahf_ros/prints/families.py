@@ -14,11 +14,11 @@ from hashlib import sha256
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ahf_ros.codes import APRILTAG_NAMES, ARUCO_NAMES, CCTAG_NAMES, RING_NAMES
-from ahf_ros.codes.kept import kept_while_unchanged
+from ahf_ros.prints import APRILTAG_NAMES, ARUCO_NAMES, CCTAG_NAMES, RING_NAMES
+from ahf_ros.prints.kept import kept_while_unchanged
 
 if TYPE_CHECKING:
-    from ahf_ros.codes.prints import Print
+    from ahf_ros.prints.prints import Print
 
 KINDS: dict[str, tuple[str, ...]] = {
     'ring': RING_NAMES,
@@ -178,7 +178,7 @@ def print_in(text: str, files: str = '') -> FamilyPrint:
 
 def _usual_design(of: FamilyPrint) -> Print:
     """Return the print of a family that this package brings along."""
-    from ahf_ros.codes import cctag, dots, gsi, ring, square
+    from ahf_ros.prints import cctag, dots, gsi, ring, square
 
     if of.kind == 'ring':
         return ring.family(of.name)
@@ -200,7 +200,7 @@ def prints_of(files: str) -> dict[str, FamilyPrint]:
     for path in (part.strip() for part in files.split(',')):
         of = _described(path)
         if of.name in found or (of.name in _USUAL and of.name not in _REPLACED):
-            from ahf_ros.codes.data_file import read_data_file
+            from ahf_ros.prints.data_file import read_data_file
 
             name = dict(read_data_file(path).items())['family']
             name.refuse('a name that no other family has')
@@ -212,8 +212,8 @@ def prints_of(files: str) -> dict[str, FamilyPrint]:
 def _described(path: str) -> FamilyPrint:
     """Return the family that a data file describes, with its print."""
     from ahf_ros.base.opening import Most, read_bytes
-    from ahf_ros.codes import dots, gsi, ring
-    from ahf_ros.codes.data_file import read_data_file
+    from ahf_ros.prints import dots, gsi, ring
+    from ahf_ros.prints.data_file import read_data_file
 
     fields = dict(read_data_file(path).items())
     kind = 'gsi' if 'template' in fields else 'dots' if 'dot_circle' in fields else 'ring'

@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from ahf_ros.base.settings.parameter import check_parameters, numbers_in, parameter
-from ahf_ros.codes import SQUARE_NAMES
-from ahf_ros.codes.families import ONE, FamilyPrint, check_numbers, print_in
-from ahf_ros.codes.prints import Proportions
-from ahf_ros.codes.selection import select_ids
-from ahf_ros.codes.square import HALF_SIDE
-from ahf_ros.printing.paper import LABEL_SHEETS, Page, length_in, page_in
+from ahf_ros.prints import SQUARE_NAMES
+from ahf_ros.prints.families import ONE, FamilyPrint, check_numbers, print_in
+from ahf_ros.prints.printing.paper import LABEL_SHEETS, Page, length_in, page_in
+from ahf_ros.prints.prints import Proportions
+from ahf_ros.prints.selection import select_ids
+from ahf_ros.prints.square import HALF_SIDE
 
 _NO_LABELS = 'none'
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ahf_ros.codes.prints import Disc, Print, Proportions, Shape
+from ahf_ros.prints.prints import Disc, Print, Proportions, Shape
 
 _QUIET_ZONE = 1.5  # in radii of the outermost circle, which is the dot
 _WIDTHS = {'cctag3': (5, 0.10, 0.15), 'cctag4': (7, 0.08, 0.12)}

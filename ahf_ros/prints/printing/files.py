@@ -12,9 +12,9 @@ from pathlib import Path
 from typing import Any
 
 from ahf_ros.base.extras import need
-from ahf_ros.codes.designs import Arc
-from ahf_ros.printing.drawing import Drawing, Ink
-from ahf_ros.printing.sheets import Sheets
+from ahf_ros.prints.designs import Arc
+from ahf_ros.prints.printing.drawing import Drawing, Ink
+from ahf_ros.prints.printing.sheets import Sheets
 
 FORMATS = '.pdf', '.svg'
 """Endings of the files that sheets are written to."""

@@ -20,10 +20,10 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ahf_ros.base.opening import reader
-from ahf_ros.codes import RING_FOLDER, RING_NAMES, VENDOR_NAMES
-from ahf_ros.codes.cyclic import CyclicFamily, mirrored_words, smallest_rotation
-from ahf_ros.codes.data_file import Entry, pinhole_in, read_data_file
-from ahf_ros.codes.prints import Disc, Proportions, Ring, Sectors, Shape
+from ahf_ros.prints import RING_FOLDER, RING_NAMES, VENDOR_NAMES
+from ahf_ros.prints.cyclic import CyclicFamily, mirrored_words, smallest_rotation
+from ahf_ros.prints.data_file import Entry, pinhole_in, read_data_file
+from ahf_ros.prints.prints import Disc, Proportions, Ring, Sectors, Shape
 
 FAMILY_NAMES = VENDOR_NAMES
 """The ring code families that vendors print."""

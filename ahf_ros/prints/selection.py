@@ -11,8 +11,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ahf_ros.codes.cyclic import CyclicFamily, rotated_words
-from ahf_ros.codes.prints import Print
+from ahf_ros.prints.cyclic import CyclicFamily, rotated_words
+from ahf_ros.prints.prints import Print
 
 _STARTS = 4
 _STEPS = 3000  # exchanges after each start
@@ -106,7 +106,7 @@ def select_ids(design: Print, ids: Sequence[int], count: int) -> list[int]:
 
     Examples
     --------
-    >>> from ahf_ros.codes.ring import family
+    >>> from ahf_ros.prints.ring import family
     >>> ids = select_ids(family('metashape14'), range(1, 562), 20)
     >>> len(ids)
     20

@@ -12,9 +12,6 @@ from typing import Any
 
 import numpy as np
 
-from ahf_ros.codes import RING_NAMES
-from ahf_ros.codes.cyclic import smallest_rotation
-from ahf_ros.codes.ring import BITS, Family, conforming, family
 from ahf_ros.detectors.ring.bands import (
     GROWTH,
     MINIMUM_TARGETS,
@@ -26,6 +23,9 @@ from ahf_ros.detectors.ring.bands import (
     lengths_along,
     printed_band,
 )
+from ahf_ros.prints import RING_NAMES
+from ahf_ros.prints.cyclic import smallest_rotation
+from ahf_ros.prints.ring import BITS, Family, conforming, family
 
 Rules = dict[str, Any]
 """Arguments of `conforming`."""

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ahf_ros.codes.prints import Cells, Disc, Ring, Sectors, Shape
+from ahf_ros.prints.prints import Cells, Disc, Ring, Sectors, Shape
 
 Point = tuple[float, float]
 
@@ -33,7 +33,7 @@ def contours(ink: Iterable[Shape]) -> tuple[Contour, ...]:
 
     Examples
     --------
-    >>> from ahf_ros.codes.ring import family
+    >>> from ahf_ros.prints.ring import family
     >>> rings = family('metashape12')
     >>> len(contours(rings.ink(rings.word(1), pinhole=0.05)))  # dot, hole, two arcs of the band
     4

@@ -9,9 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ahf_ros.codes import ring
-from ahf_ros.codes.dots import DOTS_DESIGN
-from ahf_ros.codes.families import (
+from ahf_ros.detectors import DetectorSettings
+from ahf_ros.prints import ring
+from ahf_ros.prints.dots import DOTS_DESIGN
+from ahf_ros.prints.families import (
     FAMILY_NAMES,
     FamilyPrint,
     check_numbers,
@@ -19,8 +20,7 @@ from ahf_ros.codes.families import (
     prints_in,
     prints_of,
 )
-from ahf_ros.codes.gsi import GSI_LIBRARY
-from ahf_ros.detectors import DetectorSettings
+from ahf_ros.prints.gsi import GSI_LIBRARY
 from ahf_ros.synthetic.scene import SceneSettings
 
 

@@ -6,8 +6,8 @@ import cv2
 import numpy as np
 import pytest
 
-from ahf_ros.codes import square
-from ahf_ros.codes.square import SQUARE_NAMES, dictionary, marker, words
+from ahf_ros.prints import square
+from ahf_ros.prints.square import SQUARE_NAMES, dictionary, marker, words
 from support.square_markers import needs_square_markers
 
 pytestmark = needs_square_markers

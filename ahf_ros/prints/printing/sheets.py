@@ -11,10 +11,10 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from ahf_ros.base.text import counted
-from ahf_ros.codes.designs import circle, contours
-from ahf_ros.printing.drawing import Drawing, Ink, Line, Text, text_width
-from ahf_ros.printing.paper import LABEL_SHEETS
-from ahf_ros.printing.settings import SheetSettings
+from ahf_ros.prints.designs import circle, contours
+from ahf_ros.prints.printing.drawing import Drawing, Ink, Line, Text, text_width
+from ahf_ros.prints.printing.paper import LABEL_SHEETS
+from ahf_ros.prints.printing.settings import SheetSettings
 
 MARGIN = 12.0
 """Along each edge of a page without labels; scale bars and page numbers are in it."""

@@ -16,9 +16,9 @@ from pathlib import Path
 import numpy as np
 
 from ahf_ros.base.opening import reader
-from ahf_ros.codes.data_file import Entry, read_data_file
-from ahf_ros.codes.kept import kept_while_unchanged
-from ahf_ros.codes.prints import Disc, Print, Proportions, Shape
+from ahf_ros.prints.data_file import Entry, read_data_file
+from ahf_ros.prints.kept import kept_while_unchanged
+from ahf_ros.prints.prints import Disc, Print, Proportions, Shape
 
 GSI_LIBRARY = Path(__file__).with_name('gsi.json')
 """Template, positions and known numbers of GSI's targets."""

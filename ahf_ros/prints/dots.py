@@ -16,10 +16,10 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ahf_ros.base.opening import reader
-from ahf_ros.codes.cyclic import CyclicFamily, mirrored_words, smallest_rotation
-from ahf_ros.codes.data_file import pinhole_in, read_data_file
-from ahf_ros.codes.kept import kept_while_unchanged
-from ahf_ros.codes.prints import Disc, Proportions, Ring, Shape
+from ahf_ros.prints.cyclic import CyclicFamily, mirrored_words, smallest_rotation
+from ahf_ros.prints.data_file import pinhole_in, read_data_file
+from ahf_ros.prints.kept import kept_while_unchanged
+from ahf_ros.prints.prints import Disc, Proportions, Ring, Shape
 
 DOTS_DESIGN = Path(__file__).with_name('dots.json')
 """The design of rings of dots that this package prints."""

@@ -9,8 +9,8 @@ from typing import Any
 import cv2
 import numpy as np
 
-from ahf_ros.codes import APRILTAG_NAMES, SQUARE_NAMES
-from ahf_ros.codes.prints import Cells, Print, Proportions, Shape
+from ahf_ros.prints import APRILTAG_NAMES, SQUARE_NAMES
+from ahf_ros.prints.prints import Cells, Print, Proportions, Shape
 
 HALF_SIDE = 2.4
 """Half the side of a square marker, in radii of the dot of a ring target of the same size."""

@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ahf_ros.codes.gsi import GSI_LIBRARY, Rule, point_family, positions_of, valid_words, value_of
-from ahf_ros.codes.gsi_learning import library_text, with_codes
+from ahf_ros.detectors.learning.points import library_text, with_codes
+from ahf_ros.prints.gsi import GSI_LIBRARY, Rule, point_family, positions_of, valid_words, value_of
 
 KNOWN = {
     1: (3, 6, 8),

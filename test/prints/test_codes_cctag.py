@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ahf_ros.codes import CCTAG_NAMES
-from ahf_ros.codes.cctag import circle_family
-from ahf_ros.codes.families import print_in
-from ahf_ros.codes.selection import select_ids
+from ahf_ros.prints import CCTAG_NAMES
+from ahf_ros.prints.cctag import circle_family
+from ahf_ros.prints.families import print_in
+from ahf_ros.prints.selection import select_ids
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""Code words and printed designs; here the names of families, which settings need without them."""
+"""Code words, printed designs and sheets; here the names of families, all that settings need."""
 
 from __future__ import annotations
 

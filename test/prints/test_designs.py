@@ -11,8 +11,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ahf_ros.codes.designs import Arc, Contour, _outlines, contours
-from ahf_ros.codes.families import print_in
+from ahf_ros.prints.designs import Arc, Contour, _outlines, contours
+from ahf_ros.prints.families import print_in
 from ahf_ros.synthetic.covers import ink_cover
 from support.square_markers import needs_square_markers
 

@@ -1,6 +1,6 @@
 """The design and the codes of printed targets, learnt from measured coordinates of their dots.
 
-What was learnt is written as the data file that `ahf_ros.codes.gsi.point_family` reads.
+What was learnt is written as the data file that `ahf_ros.prints.gsi.point_family` reads.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 
-from ahf_ros.codes.gsi import PointFamily, positions_of, value_of
+from ahf_ros.prints.gsi import PointFamily, positions_of, value_of
 
 _REFERENCE_LABEL = re.compile(r'CODE(\d+)')
 _DOT_LABEL = re.compile(r'NUGGET(\d+)_(\w+)')

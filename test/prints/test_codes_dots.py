@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ahf_ros.codes.dots import DOTS_DESIGN, dot_family, smallest_bracelet
+from ahf_ros.prints.dots import DOTS_DESIGN, dot_family, smallest_bracelet
 
 DOTS = dot_family()
 

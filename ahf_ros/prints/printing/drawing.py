@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ahf_ros.codes.designs import Contour
+from ahf_ros.prints.designs import Contour
 
 _LETTERS = {
     191: "'",

@@ -14,11 +14,11 @@ import numpy as np
 import pytest
 
 from ahf_ros import create_detector
-from ahf_ros.printing.drawing import Line, Text, text_width
-from ahf_ros.printing.files import geometry_text, sheet_files
-from ahf_ros.printing.paper import LABEL_SHEETS, length_in, page_in
-from ahf_ros.printing.settings import SheetSettings
-from ahf_ros.printing.sheets import MARGIN, Sheets
+from ahf_ros.prints.printing.drawing import Line, Text, text_width
+from ahf_ros.prints.printing.files import geometry_text, sheet_files
+from ahf_ros.prints.printing.paper import LABEL_SHEETS, length_in, page_in
+from ahf_ros.prints.printing.settings import SheetSettings
+from ahf_ros.prints.printing.sheets import MARGIN, Sheets
 from support import ROOT
 from support.square_markers import needs_square_markers
 from support.svg import rastered

@@ -9,11 +9,11 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from ahf_ros.codes import selection
-from ahf_ros.codes.dots import dot_family
-from ahf_ros.codes.families import print_in
-from ahf_ros.codes.ring import family
-from ahf_ros.codes.selection import independent_set, select_ids
+from ahf_ros.prints import selection
+from ahf_ros.prints.dots import dot_family
+from ahf_ros.prints.families import print_in
+from ahf_ros.prints.ring import family
+from ahf_ros.prints.selection import independent_set, select_ids
 from support.square_markers import needs_square_markers
 
 

@@ -1,0 +1,1 @@
+"""Families that nobody described, learnt from photographs or coordinates of their targets."""
