@@ -19,7 +19,7 @@ _MODULES = {
     'Identification': 'base.target',
     'IdentificationSettings': 'session_settings',
     'Identifier': 'filtering.identifier',
-    'ImageStack': 'imaging.stack',
+    'ImageStack': 'vision.stack',
     'SceneSettings': 'synthetic.scene',
     'SearchTrace': 'base.target',
     'SquareMarker': 'base.target',
@@ -59,7 +59,6 @@ if TYPE_CHECKING:  # which takes what is imported `as` itself for public
     from ahf_ros.evaluation import score as score
     from ahf_ros.filtering.identifier import Identifier as Identifier
     from ahf_ros.filtering.settings import AdaptiveSettings as AdaptiveSettings
-    from ahf_ros.imaging.stack import ImageStack as ImageStack
     from ahf_ros.interchange.image_files import read_image as read_image
     from ahf_ros.interchange.image_files import write_image as write_image
     from ahf_ros.orientation.adjustment import adjust as adjust
@@ -71,6 +70,7 @@ if TYPE_CHECKING:  # which takes what is imported `as` itself for public
     from ahf_ros.session_settings import IdentificationSettings as IdentificationSettings
     from ahf_ros.synthetic.scene import SceneSettings as SceneSettings
     from ahf_ros.synthetic.scene import render as render
+    from ahf_ros.vision.stack import ImageStack as ImageStack
 else:
     __all__ = list(_MODULES)
 

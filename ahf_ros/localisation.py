@@ -33,9 +33,9 @@ import numpy as np
 
 from ahf_ros.base.target import Target
 from ahf_ros.cloud_settings import FULL, NEIGHBOURHOOD, CloudGrid
-from ahf_ros.features.robust import NORMAL
 from ahf_ros.interchange.cloud_files import AXES
 from ahf_ros.interchange.point_clouds import COVARIANCE, TARGET_POINT
+from ahf_ros.vision.robust import NORMAL
 
 MINIMUM_POINTS = 12
 """Minimum number of points that a position is fitted to; there are eleven unknowns."""

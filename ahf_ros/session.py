@@ -27,10 +27,10 @@ from ahf_ros.detectors import (
 )
 from ahf_ros.filtering.identifier import Identifier
 from ahf_ros.filtering.trials import DetectorFunction
-from ahf_ros.imaging.stack import ImageStack
 from ahf_ros.prints.families import AUTO
 from ahf_ros.session_settings import IdentificationSettings
 from ahf_ros.settling import SettlingIdentifier
+from ahf_ros.vision.stack import ImageStack
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack

@@ -12,7 +12,7 @@ from ahf_ros.base.settings.parameter import check_parameters, parameter
 from ahf_ros.base.text import counted
 from ahf_ros.detectors import DETECTOR, DetectorSettings, detector_name, estimator
 from ahf_ros.filtering.settings import AdaptiveSettings
-from ahf_ros.imaging import MAXIMUM_IMAGES
+from ahf_ros.vision import MAXIMUM_IMAGES
 
 MAXIMUM_TARGETS = 100_000
 """Maximum of N."""

@@ -29,7 +29,7 @@ from ahf_ros.detectors.explained import without_targets
 from ahf_ros.filtering.genetic import Values
 from ahf_ros.filtering.identifier import Identifier, Memory
 from ahf_ros.filtering.trials import DetectorFunction, Trials
-from ahf_ros.imaging.stack import ImageStack
+from ahf_ros.vision.stack import ImageStack
 
 FIRST = 3
 """Images with targets in which all families are looked for, unless one makes it clear."""

@@ -36,12 +36,12 @@ from ahf_ros.detectors.ring import confidence as ring
 from ahf_ros.detectors.ring.contests import overlapping
 from ahf_ros.detectors.ring.detector import find_hypotheses
 from ahf_ros.detectors.ring.hypotheses import Hypotheses
-from ahf_ros.features.pyramid import image_pyramid
-from ahf_ros.imaging.image import as_gray
 from ahf_ros.prints.dots import dot_family
 from ahf_ros.prints.gsi import point_family
 from ahf_ros.prints.ring import Family, canonical
 from ahf_ros.synthetic.scene import Rendering, render
+from ahf_ros.vision.image import as_gray
+from ahf_ros.vision.pyramid import image_pyramid
 from benchmarks import report
 from support.pictures.conditions import COMMON, FOREIGN, Scene, scenes
 from support.pictures.dot_conditions import dots_scenes, gsi_scenes, with_covered_dots

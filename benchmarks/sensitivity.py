@@ -36,7 +36,7 @@ from benchmarks.report import progress, table
 from support.pictures.conditions import Scene, disturbed, strange
 
 ROOT = Path(__file__).resolve().parent.parent
-ROOMS = ('ahf_ros.features.', 'ahf_ros.detectors.ring.')
+ROOMS = ('ahf_ros.vision.', 'ahf_ros.detectors.ring.')
 BOUNDED = {'CERTAIN', '_STRAIGHT', 'WHOLE', '_MINIMUM_AGREEMENT'}
 """Constants that are meaningful up to 1 only: their distance from 1 is halved and doubled."""
 

@@ -28,20 +28,20 @@ from ahf_ros.detectors.ring.likelihood import (
     level_evidence,
 )
 from ahf_ros.detectors.ring.polar import angles_of, polar_images
-from ahf_ros.features.circle_fit import fit_dots
-from ahf_ros.features.dot_search import voted_dots, whole_dots
-from ahf_ros.features.frame import circle_outlines, project
-from ahf_ros.features.pyramid import image_pyramid
-from ahf_ros.features.sampling import sample, sample_circles
 from ahf_ros.filtering.homomorphic import HomomorphicFilter
-from ahf_ros.imaging.logarithm import logarithm
-from ahf_ros.imaging.stack import COMBINATIONS
 from ahf_ros.prints.designs import contours
 from ahf_ros.prints.families import print_in
 from ahf_ros.prints.printing.drawing import Drawing, Ink
 from ahf_ros.prints.printing.files import svg_bytes
 from ahf_ros.prints.ring import canonical, family
 from ahf_ros.synthetic.patterns import LIGHT_NAMES
+from ahf_ros.vision.circle_fit import fit_dots
+from ahf_ros.vision.dot_search import voted_dots, whole_dots
+from ahf_ros.vision.frame import circle_outlines, project
+from ahf_ros.vision.logarithm import logarithm
+from ahf_ros.vision.pyramid import image_pyramid
+from ahf_ros.vision.sampling import sample, sample_circles
+from ahf_ros.vision.stack import COMBINATIONS
 
 FOLDER = Path(__file__).resolve().parent.parent / 'docs' / 'pictures'
 DPI = 110

@@ -13,7 +13,7 @@ import numpy as np
 
 from ahf_ros.filtering.homomorphic import Transfer, transfer
 from ahf_ros.filtering.settings import FilterSettings
-from ahf_ros.imaging.logarithm import logarithm, mapping, sample_lattice
+from ahf_ros.vision.logarithm import logarithm, mapping, sample_lattice
 
 
 def distances(height: int, width: int) -> np.ndarray:

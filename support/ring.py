@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from ahf_ros.detectors.ring.circles import REACH
-from ahf_ros.features.circle_fit import Fit, fit_dots
-from ahf_ros.features.frame import affine_frames
 from ahf_ros.prints.ring import Family
+from ahf_ros.vision.circle_fit import Fit, fit_dots
+from ahf_ros.vision.frame import affine_frames
 
 
 def made_up(x: Sequence[float], share: float = 1.0, radius: float = 10.0) -> Fit:

@@ -38,7 +38,7 @@ OPENERS = {'open', 'read_text', 'read_bytes', 'imread', 'loadtxt', 'genfromtxt',
 
 MAY_OPEN = {
     **dict.fromkeys(('base/opening.py', 'base/writing.py'), 'ways in and out'),
-    'imaging/whole.py': 'standard error',
+    'interchange/whole.py': 'standard error',
     'interchange/arrays.py': 'members of an archive in memory',
     'interchange/exif.py': 'a file that is open already',
     'interchange/export/colmap.py': 'a database that was written before',
@@ -50,7 +50,7 @@ MAY_OPEN = {
     'batch/results.py': 'results that are gone on with, see test_results.py',
     'cli/__init__.py': 'standard streams',
     'detectors/external/command.py': 'what a program printed',
-    'features/logistic.py': 'weights of the package',
+    'vision/logistic.py': 'weights of the package',
     'nodes/process.py': 'no files',
     'nodes/processes.py': 'what the system says of processes',
 }

@@ -128,7 +128,7 @@ def test_commands_of_windows_have_words(command: str, words: list[str]) -> None:
 
 
 def test_tests_of_the_core() -> None:
-    files = ('interchange/test_target_json.py', 'imaging/test_stack.py', 'prints/test_families.py')
+    files = ('interchange/test_target_json.py', 'vision/test_stack.py', 'prints/test_families.py')
     done = python(
         '-c', TESTS.replace('{without}', WITHOUT_POSIX), *(ROOT / 'test' / it for it in files)
     )

@@ -2,7 +2,7 @@
 
 Dark areas are larger than in the print if ink has spread, and smaller if there was too much light.
 All families report the same: what has grown in light, where gray values are taken to be light to
-the power of 1 / `ahf_ros.imaging.image.GAMMA`. A linear camera seems to show more ink by up to two
+the power of 1 / `ahf_ros.vision.image.GAMMA`. A linear camera seems to show more ink by up to two
 thirds of the standard deviation of its blur. Edges of wide marks do not show whether gray values
 have a gamma.
 """

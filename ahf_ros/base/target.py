@@ -320,7 +320,7 @@ class Identification:
         Whether the image seems to be mirrored: most IDs read are not among the expected ones, and
         most would be in a mirror.
     combination : str
-        Combination of the stack that gave the targets, see `ahf_ros.imaging.stack`; empty for one
+        Combination of the stack that gave the targets, see `ahf_ros.vision.stack`; empty for one
         image.
     expected_ids : tuple of int
         The IDs that the image was expected to show, in ascending order; empty if they are unknown.

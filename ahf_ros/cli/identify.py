@@ -243,8 +243,8 @@ def _hint(settings: IdentificationSettings, identified: int) -> list[str]:
 def _advice(paths: Sequence[str], settings: IdentificationSettings) -> list[str]:
     """Return lines on the first image in which nothing was identified that says why, or on all."""
     from ahf_ros.advice import advice_on_all
-    from ahf_ros.imaging.image import check_image
     from ahf_ros.interchange.image_files import read_image
+    from ahf_ros.vision.image import check_image
 
     def images() -> Iterator[tuple[str, np.ndarray]]:
         for path in paths:

@@ -183,8 +183,8 @@ def _crops(image: np.ndarray, bands: Bands) -> dict[bytes, np.ndarray]:
     import cv2
     import numpy as np
 
-    from ahf_ros.features import frame
-    from ahf_ros.imaging.image import as_gray
+    from ahf_ros.vision import frame
+    from ahf_ros.vision.image import as_gray
 
     gray = np.clip(as_gray(image), 0, 255).astype(np.uint8)
     sides = np.rint(2 * _AROUND * frame.ellipse_axes(bands.frames)[0] * bands.outer).astype(int)

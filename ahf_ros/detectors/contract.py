@@ -15,8 +15,8 @@ if TYPE_CHECKING:
     import numpy as np
     from typing_extensions import Self
 
-    from ahf_ros.features.pyramid import ImagePyramid
     from ahf_ros.prints.prints import Print
+    from ahf_ros.vision.pyramid import ImagePyramid
 
 Code = TypeVar('Code', bound='Print')
 """The prints of one kind."""

@@ -8,7 +8,7 @@ from math import hypot
 import numpy as np
 
 from ahf_ros.base.target import DottedTarget, Prints, Target, reach_of
-from ahf_ros.features.frame import affine_frames
+from ahf_ros.vision.frame import affine_frames
 
 _MARGIN = 1.15  # times the reach of a target, within which the blur of its edges is
 _ANGLES = 64  # in which the surroundings of a target are looked at

@@ -31,10 +31,10 @@ from ahf_ros.detectors.contract import (
 )
 from ahf_ros.detectors.evidence import is_clear
 from ahf_ros.detectors.explained import without_targets
-from ahf_ros.features.common_search import CommonSearch
-from ahf_ros.features.pyramid import ImagePyramid, image_pyramid
-from ahf_ros.imaging.image import as_gray, check_image
 from ahf_ros.prints.families import AUTO
+from ahf_ros.vision.common_search import CommonSearch
+from ahf_ros.vision.image import as_gray, check_image
+from ahf_ros.vision.pyramid import ImagePyramid, image_pyramid
 
 _DIGITS = 2  # of a confidence, beyond which one is not surer than another
 

@@ -31,14 +31,14 @@ from ahf_ros.detectors.claims import best_targets
 from ahf_ros.detectors.contract import DetectorSettings, FamilyDetector
 from ahf_ros.detectors.ring.circles import REACH, target_circles
 from ahf_ros.detectors.ring.refinement import refine_centres
-from ahf_ros.features.array_record import ArrayRecord
-from ahf_ros.features.circle_fit import fit_circles, fit_dots
-from ahf_ros.features.ellipse_targets import targets_from_frames
-from ahf_ros.features.frame import affine_frames, circle_points, ellipse_axes, project
-from ahf_ros.features.outlines import measured
-from ahf_ros.features.sampling import sample, within
-from ahf_ros.imaging.image import as_gray, check_image, stretched_to_8_bit
 from ahf_ros.prints.ring import Family
+from ahf_ros.vision.array_record import ArrayRecord
+from ahf_ros.vision.circle_fit import fit_circles, fit_dots
+from ahf_ros.vision.ellipse_targets import targets_from_frames
+from ahf_ros.vision.frame import affine_frames, circle_points, ellipse_axes, project
+from ahf_ros.vision.image import as_gray, check_image, stretched_to_8_bit
+from ahf_ros.vision.outlines import measured
+from ahf_ros.vision.sampling import sample, within
 
 _WINDOW = 80  # side of the square in which the threshold lies between the extremes, px
 _MINIMUM_CONTRAST = 20  # difference of those for there to be anything, gray values of 8 bit

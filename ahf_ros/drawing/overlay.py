@@ -24,7 +24,7 @@ from ahf_ros.base.target import (
     UndecodedTarget,
     reach_of,
 )
-from ahf_ros.imaging.image import stretched_to_8_bit
+from ahf_ros.vision.image import stretched_to_8_bit
 
 Colour = tuple[int, int, int]
 """Blue, green, red."""

@@ -11,7 +11,7 @@ the median of D. `support.fourier` has the published form, with which tests comp
 
 Two steps that the paper leaves open are defined here:
 
-- Offset: z = ln(f / range + offset), because f may be 0. `ahf_ros.imaging.logarithm.logarithm`
+- Offset: z = ln(f / range + offset), because f may be 0. `ahf_ros.vision.logarithm.logarithm`
   defines the range. The division scales g by a constant.
 - Output mapping: g is mapped linearly to 8 bit, one percentile of g to 0 and another to 255. Both
   are taken on a lattice of rows and columns that depends on the size of the image only.
@@ -33,8 +33,8 @@ import numpy as np
 
 from ahf_ros.base.target import FilterState
 from ahf_ros.filtering.settings import FilterSettings
-from ahf_ros.imaging.image import check_image
-from ahf_ros.imaging.logarithm import logarithm, mapping, sample_lattice
+from ahf_ros.vision.image import check_image
+from ahf_ros.vision.logarithm import logarithm, mapping, sample_lattice
 
 _TOLERANCE = 1e-3  # weight of a kernel, of 1, beyond its last tap: errors within one gray level
 _MARGIN = 12  # width of the periodic border around a logarithm, px; few filters reach further
@@ -146,7 +146,7 @@ def blur_taps(length: int, attenuation: float, cutoff: float) -> np.ndarray:
 class HomomorphicFilter:
     """One image, prepared to be filtered many times; thread-safe.
 
-    The image is one that `ahf_ros.imaging.image.check_image` accepts, a ValueError is raised
+    The image is one that `ahf_ros.vision.image.check_image` accepts, a ValueError is raised
     otherwise; no reference is kept.
 
     Notes

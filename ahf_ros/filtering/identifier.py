@@ -45,7 +45,7 @@ from ahf_ros.filtering.genes import BEGINNING, FIRST, genes_of, tuned
 from ahf_ros.filtering.genetic import SearchResult, Values, search
 from ahf_ros.filtering.settings import PUBLISHED, AdaptiveSettings
 from ahf_ros.filtering.trials import DetectorFunction, Trials, confirmed, fused
-from ahf_ros.imaging.stack import ImageStack
+from ahf_ros.vision.stack import ImageStack
 
 Refinement = Callable[[np.ndarray, Sequence[Target]], Sequence[Target]]
 """From the image as received and targets found in a filtered one to the same targets, with centres

@@ -20,7 +20,7 @@ from ahf_ros.filtering.genes import tuned
 from ahf_ros.filtering.genetic import Values
 from ahf_ros.filtering.homomorphic import HomomorphicFilter
 from ahf_ros.filtering.settings import AdaptiveSettings
-from ahf_ros.imaging.stack import ImageStack
+from ahf_ros.vision.stack import ImageStack
 
 DetectorFunction = Callable[[np.ndarray], list[Target]]
 """From an 8-bit image, shape (height, width), to the targets in it. Called from several threads at

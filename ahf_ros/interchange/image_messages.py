@@ -16,8 +16,8 @@ import cv2
 import numpy as np
 
 from ahf_ros.base.text import shown
-from ahf_ros.imaging.image import check_size, without_gaps
 from ahf_ros.interchange.image_files import NotedImage, decode_bytes
+from ahf_ros.vision.image import check_size, without_gaps
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from ahf_ros.base.extras import need
-from ahf_ros.imaging.image import check_size
+from ahf_ros.vision.image import check_size
 
 _KEY_FRAME = 1  # in the flags of a packet, AV_PKT_FLAG_KEY of FFmpeg
 _MOST_LATE = 16  # images that a codec may hold back to put them in order

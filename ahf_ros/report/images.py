@@ -16,10 +16,10 @@ import numpy as np
 
 from ahf_ros.filtering.homomorphic import HomomorphicFilter
 from ahf_ros.filtering.settings import FilterSettings
-from ahf_ros.imaging.image import stretched_to_8_bit
-from ahf_ros.imaging.stack import ImageStack, unlike
 from ahf_ros.interchange.image_files import find_image, read_image
 from ahf_ros.report.results import ImageResult
+from ahf_ros.vision.image import stretched_to_8_bit
+from ahf_ros.vision.stack import ImageStack, unlike
 
 _THUMBNAIL_SIDES = 132, 88  # maximum width and height, px
 _THUMBNAIL_BYTES = 3000

@@ -21,8 +21,8 @@ from benchmarks.sensitivity import (
 )
 
 CERTAIN = 'ahf_ros.detectors.ring.hypotheses.CERTAIN'
-SCALE = 'ahf_ros.features.profiles.USUAL_BLUR'  # circle_fit imports it
-PAIR = 'ahf_ros.features.log_edges._STRONG_EDGE'  # one of two in a line
+SCALE = 'ahf_ros.vision.profiles.USUAL_BLUR'  # circle_fit imports it
+PAIR = 'ahf_ros.vision.log_edges._STRONG_EDGE'  # one of two in a line
 SCENE = SceneSettings(width=480, height=320, targets=3, dot_radius=9.0)
 
 
@@ -53,7 +53,7 @@ def test_what_cannot_be_changed_is_no_outcome(
 
 def test_constants_up_to_one_approach_it() -> None:
     assert [changed(CERTAIN, 0.98, factor) for factor in (0.5, 2.0)] == pytest.approx([0.99, 0.96])
-    assert changed('ahf_ros.features.dots._SAME', 0.3, 0.5) == 0.15
+    assert changed('ahf_ros.vision.dots._SAME', 0.3, 0.5) == 0.15
 
 
 def test_what_costs_most_comes_first() -> None:

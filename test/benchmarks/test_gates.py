@@ -26,7 +26,7 @@ from benchmarks.gates import (
 )
 
 CLOSED = Gate('every word', 'detectors.ring.hypotheses:CERTAIN', '1.1')
-NO_MATTER = Gate('blobs of few pixels', 'features.small_dots:_MINIMUM_PIXELS', '1')
+NO_MATTER = Gate('blobs of few pixels', 'vision.small_dots:_MINIMUM_PIXELS', '1')
 SCENE = SceneSettings(width=480, height=320, targets=3, dot_radius=9.0)
 
 
@@ -80,21 +80,21 @@ def test_a_gate_at_which_nothing_happens_saves_nothing(
 def test_a_detector_that_an_open_gate_breaks_has_no_pictures(
     folder: Path, named: dict[str, Picture], capfd: pytest.CaptureFixture[str]
 ) -> None:
-    broken = Gate('all', 'features.dot_search:whole_dots', 'None')
+    broken = Gate('all', 'vision.dot_search:whole_dots', 'None')
     assert seen(folder, broken) == {}
     assert 'not callable' in capfd.readouterr().err
     assert 'does not work open' in row(broken, difference({}, {}, named), 0, 1)[-1]
 
 
 def test_names_lie_in_modules_functions_and_tuples() -> None:
-    assert value_of('features.ellipses:_MINIMUM_STEP') == '0.1'
-    assert value_of('features.ellipses:_INLIER') == '0.06'  # one of two in a line
+    assert value_of('vision.ellipses:_MINIMUM_STEP') == '0.1'
+    assert value_of('vision.ellipses:_INLIER') == '0.06'  # one of two in a line
     assert value_of('detectors.ring.contests:resolve') == 'a function'
     assert value_of('detectors.ring.contests:resolve.kept') == 'owners(len(ids), on_it)'
     for missing in (
-        'features.ellipses:_NO',
-        'features.no:_MINIMUM_STEP',
-        'features.ellipses:no.a',
+        'vision.ellipses:_NO',
+        'vision.no:_MINIMUM_STEP',
+        'vision.ellipses:no.a',
     ):
         with pytest.raises(KeyError):
             value_of(missing)

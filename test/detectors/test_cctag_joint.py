@@ -11,9 +11,9 @@ import pytest
 from ahf_ros.detectors import create_detector
 from ahf_ros.detectors.cctag.joint import contested, jointly
 from ahf_ros.detectors.cctag.rings import Aligned, align
-from ahf_ros.features import frame
 from ahf_ros.prints.cctag import circle_family
 from ahf_ros.synthetic.scene import Rendering
+from ahf_ros.vision import frame
 from support.scenes import counted, errors, relative_errors, rendering
 
 FAMILY = 'cctag4'

@@ -15,8 +15,8 @@ from ahf_ros.detectors.ring.decoding import DOUBT
 from ahf_ros.detectors.ring.detector import find_hypotheses
 from ahf_ros.detectors.ring.hypotheses import CERTAIN
 from ahf_ros.detectors.ring.reading import read_bands
-from ahf_ros.features.logistic import read_weights
 from ahf_ros.prints.ring import family
+from ahf_ros.vision.logistic import read_weights
 from support.ring import measured
 from support.scenes import SMALL, rendered, rendering
 

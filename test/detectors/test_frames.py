@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from ahf_ros.detectors.square.frames import SQUARE, centres, changed, square_frames
-from ahf_ros.features.frame import project
+from ahf_ros.vision.frame import project
 
 CORNERS = np.array([[60.3, 50.7], [160.9, 58.2], [152.4, 161.6], [55.1, 149.3]])
 

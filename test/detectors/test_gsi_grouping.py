@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from ahf_ros.detectors.gsi.grouping import find_templates, nearest_dots
-from ahf_ros.features.dots import Dots
-from ahf_ros.features.frame import affine_frames
-from ahf_ros.features.homography import local_frames
 from ahf_ros.prints.gsi import point_family
+from ahf_ros.vision.dots import Dots
+from ahf_ros.vision.frame import affine_frames
+from ahf_ros.vision.homography import local_frames
 
 
 def test_the_map_knows_the_nearest_of_dots_that_are_apart() -> None:

@@ -14,9 +14,9 @@ from ahf_ros.detectors.external.guarded import guarded
 from ahf_ros.detectors.ring.hypotheses import Hypotheses
 from ahf_ros.detectors.ring.known import NOTHING_KNOWN, Explained, Prior
 from ahf_ros.evaluation import RIGHT, WRONG, judge
-from ahf_ros.features import frame
-from ahf_ros.features.pyramid import Octave, image_pyramid, octaves
 from ahf_ros.prints.ring import family
+from ahf_ros.vision import frame
+from ahf_ros.vision.pyramid import Octave, image_pyramid, octaves
 from support.drawn_dots import drawn, in_stripes
 from support.pictures import occluders
 from support.pictures.disturbed import far_apart

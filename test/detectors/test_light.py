@@ -8,7 +8,7 @@ import pytest
 
 from ahf_ros.detectors.ring.light import predicted_light
 from ahf_ros.detectors.ring.polar import angles_of
-from ahf_ros.features.frame import affine_frames
+from ahf_ros.vision.frame import affine_frames
 
 BAND = (2.25, 3.5)
 SIDE, CENTRE, RADIUS = 140, 70.3, 12.0  # px

@@ -17,7 +17,7 @@ from ahf_ros.detectors.ring.likelihood import (
     weights,
 )
 from ahf_ros.detectors.ring.polar import PolarImages
-from ahf_ros.imaging.image import SATURATED
+from ahf_ros.vision.image import SATURATED
 
 BAND = (2.25, 3.5)
 ANGLES, CIRCLES, OUTERMOST = 60, 200, BAND[1] + 0.95

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from ahf_ros import create_identifier
-from ahf_ros.features import candidates, log_edges, small_dots
-from ahf_ros.imaging.image import as_gray
+from ahf_ros.vision import candidates, log_edges, small_dots
+from ahf_ros.vision.image import as_gray
 from support.scenes import rendering
 
 

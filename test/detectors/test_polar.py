@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from ahf_ros.detectors.ring.polar import PolarImages, angles_of, on_dark_ground, polar_images
-from ahf_ros.features import frame
-from ahf_ros.imaging.image import SATURATED
+from ahf_ros.vision import frame
+from ahf_ros.vision.image import SATURATED
 from support.ring import measured
 
 BAND = (2.25, 3.5)

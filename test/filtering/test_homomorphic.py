@@ -14,7 +14,7 @@ from ahf_ros.filtering.homomorphic import (
     transfer,
 )
 from ahf_ros.filtering.settings import FilterSettings
-from ahf_ros.imaging.logarithm import logarithm
+from ahf_ros.vision.logarithm import logarithm
 from support.fourier import distances, filtered_fft, filtered_logarithm_fft, response
 
 SHAPES = [(16, 16), (17, 31), (101, 64), (64, 101), (300, 211), (140, 140)]

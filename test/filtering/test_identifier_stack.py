@@ -8,7 +8,7 @@ import pytest
 from ahf_ros.base.target import Target
 from ahf_ros.filtering.identifier import Identifier, Memory
 from ahf_ros.filtering.settings import AdaptiveSettings, GeneticSettings
-from ahf_ros.imaging.stack import COMBINATIONS, ImageStack
+from ahf_ros.vision.stack import COMBINATIONS, ImageStack
 
 GENERATOR = np.random.default_rng(3)
 IMAGES = tuple(GENERATOR.integers(20, 200, (40, 40)).astype(np.uint8) for _ in range(3))

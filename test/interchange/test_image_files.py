@@ -14,8 +14,8 @@ import pytest
 from ahf_ros.base.extras import missing
 from ahf_ros.cli import main
 from ahf_ros.cli.identify import image_paths
-from ahf_ros.imaging.headers import read_header
 from ahf_ros.interchange.exif import read_exif
+from ahf_ros.interchange.headers import read_header
 from ahf_ros.interchange.image_files import (
     decode_bytes,
     read_image,
@@ -170,7 +170,7 @@ def test_images_that_are_too_large_are_named_before_they_are_decoded(
     wide = np.zeros((16, 40_000), np.uint8)
     (tmp_path / f'wide{suffix}').write_bytes(cv2.imencode(suffix, wide)[1].tobytes())
     monkeypatch.setattr(cv2, 'imdecode', None)
-    monkeypatch.setattr('ahf_ros.imaging.image._MAXIMUM_SIDE', 30_000)
+    monkeypatch.setattr('ahf_ros.vision.image._MAXIMUM_SIDE', 30_000)
     with pytest.raises(ValueError, match='is 40000 x 16 px, accepted are sides of at most 30000'):
         read_image(tmp_path / f'wide{suffix}')
 

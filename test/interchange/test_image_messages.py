@@ -16,7 +16,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ahf_ros.detectors import create_detector
-from ahf_ros.imaging.image import as_gray, check_image
 from ahf_ros.interchange.image_messages import (
     ENCODINGS,
     WITH_PLANES,
@@ -24,6 +23,7 @@ from ahf_ros.interchange.image_messages import (
     decode_image,
 )
 from ahf_ros.synthetic.scene import SceneSettings, render
+from ahf_ros.vision.image import as_gray, check_image
 from support.hostile import IMAGES, SIDES, Fields, generators, mutated
 
 GRAY = np.arange(40, 100, dtype=np.uint8).reshape(6, 10)

@@ -33,17 +33,17 @@ from ahf_ros.detectors.cctag.rings import (
 )
 from ahf_ros.detectors.claims import reported
 from ahf_ros.detectors.contract import FamilyDetector, moved_targets
-from ahf_ros.features import frame
-from ahf_ros.features.candidates import cells_along, find_peaks
-from ahf_ros.features.dot_search import voted_dots, whole_dots
-from ahf_ros.features.dots import Dots
-from ahf_ros.features.ellipse_targets import ellipse_fields, targets_from_frames
-from ahf_ros.features.large_targets import targets_of_octaves
-from ahf_ros.features.log_edges import LogEdges, edges_in_bands
-from ahf_ros.features.pyramid import ImagePyramid, Octave, image_pyramid, octaves
-from ahf_ros.imaging.image import as_gray, check_image
 from ahf_ros.prints import CCTAG_NAMES
 from ahf_ros.prints.cctag import CircleFamily, circle_family
+from ahf_ros.vision import frame
+from ahf_ros.vision.candidates import cells_along, find_peaks
+from ahf_ros.vision.dot_search import voted_dots, whole_dots
+from ahf_ros.vision.dots import Dots
+from ahf_ros.vision.ellipse_targets import ellipse_fields, targets_from_frames
+from ahf_ros.vision.image import as_gray, check_image
+from ahf_ros.vision.large_targets import targets_of_octaves
+from ahf_ros.vision.log_edges import LogEdges, edges_in_bands
+from ahf_ros.vision.pyramid import ImagePyramid, Octave, image_pyramid, octaves
 
 _COLOURS = 1, -1  # of circles that are looked for
 _SMALLEST, _SMALL = 2.0, 11.5  # radii of circles that are looked for, px, also in the half

@@ -24,8 +24,8 @@ from ahf_ros.detectors.cctag.patch import (
     Patch,
 )
 from ahf_ros.detectors.cctag.rings import Prior, usual_perspective
-from ahf_ros.features import frame
-from ahf_ros.features.robust import NORMAL, geman_mcclure
+from ahf_ros.vision import frame
+from ahf_ros.vision.robust import NORMAL, geman_mcclure
 
 _ENOUGH = 4  # targets, and edges of light, that tell what is usual
 _SHOWN = 0.3  # ln of the height of an edge of light that tells

@@ -25,11 +25,11 @@ from ahf_ros.detectors.cctag.templates import (
     templates,
     totals,
 )
-from ahf_ros.features import frame
-from ahf_ros.features.array_record import ArrayRecord
-from ahf_ros.features.dots import Dots
-from ahf_ros.features.sampling import sample_circles
 from ahf_ros.prints.cctag import CircleFamily
+from ahf_ros.vision import frame
+from ahf_ros.vision.array_record import ArrayRecord
+from ahf_ros.vision.dots import Dots
+from ahf_ros.vision.sampling import sample_circles
 
 _EVERY = 2  # one of so many angles and radii is looked at
 _EDGES: tuple[Edge, ...] = (

@@ -18,10 +18,10 @@ from ahf_ros.detectors.cctag.light import EDGES, Lights
 from ahf_ros.detectors.cctag.patch import Patch
 from ahf_ros.detectors.cctag.rings import Aligned, Prior, align, likely_ids
 from ahf_ros.detectors.cctag.templates import MAXIMUM_SHIFT, signed_circles
-from ahf_ros.features import frame
-from ahf_ros.imaging.image import GAMMA, as_light
 from ahf_ros.prints import CCTAG_NAMES
 from ahf_ros.prints.cctag import CircleFamily, circle_family
+from ahf_ros.vision import frame
+from ahf_ros.vision.image import GAMMA, as_light
 
 _LARGEST = 32.0  # px: rays place the rings of larger targets as well, and much faster
 _TELLING = 16  # targets that tell what is usual

@@ -24,10 +24,10 @@ from ahf_ros.detectors.cctag.rays import (
     clipped,
 )
 from ahf_ros.detectors.cctag.templates import less_lines
-from ahf_ros.features import frame
-from ahf_ros.features.array_record import ArrayRecord
-from ahf_ros.features.normal import normal_integral
-from ahf_ros.features.sampling import sample_circles
+from ahf_ros.vision import frame
+from ahf_ros.vision.array_record import ArrayRecord
+from ahf_ros.vision.normal import normal_integral
+from ahf_ros.vision.sampling import sample_circles
 
 _EVERY = 2  # one of so many angles and radii is looked at
 _ANGLES, _RADII = ANGLES[::_EVERY], PROFILE[::_EVERY].astype(np.float32)

@@ -16,8 +16,8 @@ from ahf_ros.detectors.cctag.light import Lights, usual_widths
 from ahf_ros.detectors.cctag.rays import clipped
 from ahf_ros.detectors.cctag.rings import Aligned
 from ahf_ros.detectors.cctag.templates import MASK
-from ahf_ros.features import frame
-from ahf_ros.features.normal import normal_integral
+from ahf_ros.vision import frame
+from ahf_ros.vision.normal import normal_integral
 
 PERSPECTIVE, PRINT, SLOPES, EDGES = slice(5, 7), slice(7, 10), slice(10, 12), 12
 """Where parameters are: those of the frame are first, and each edge of light has `OF_EDGE`."""

@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 import cv2
 import numpy as np
 
-from ahf_ros.features import frame
-from ahf_ros.features.array_record import ArrayRecord
-from ahf_ros.features.robust import NORMAL, geman_mcclure
+from ahf_ros.vision import frame
+from ahf_ros.vision.array_record import ArrayRecord
+from ahf_ros.vision.robust import NORMAL, geman_mcclure
 
 _RAYS = 64
 ANGLES = 2 * np.pi * np.arange(_RAYS) / _RAYS

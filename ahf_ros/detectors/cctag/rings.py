@@ -36,13 +36,13 @@ from ahf_ros.detectors.cctag.templates import (
     two_discs,
 )
 from ahf_ros.detectors.expected import against
-from ahf_ros.features import frame
-from ahf_ros.features.array_record import ArrayRecord
-from ahf_ros.features.logistic import logistic
-from ahf_ros.features.normal import normal_integral
-from ahf_ros.features.robust import NORMAL
-from ahf_ros.imaging.image import as_light
 from ahf_ros.prints.cctag import CircleFamily
+from ahf_ros.vision import frame
+from ahf_ros.vision.array_record import ArrayRecord
+from ahf_ros.vision.image import as_light
+from ahf_ros.vision.logistic import logistic
+from ahf_ros.vision.normal import normal_integral
+from ahf_ros.vision.robust import NORMAL
 
 _TRIED_SHIFTS = -1.2, -0.6, 0.0, 0.6, 1.2  # deviations
 _TRIED_BLURS, _TRIED_SHARPENINGS = (-1.0, 0.0, 1.4), (3.0, 7.0)  # the same

@@ -8,8 +8,8 @@ from functools import lru_cache
 import numpy as np
 
 from ahf_ros.detectors.cctag.rays import ALONG, PROFILE
-from ahf_ros.features.normal import normal_integral
 from ahf_ros.prints.cctag import CircleFamily
+from ahf_ros.vision.normal import normal_integral
 
 SIZE_STEP = 1.05
 """Ratio of radii that share templates."""

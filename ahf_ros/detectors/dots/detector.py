@@ -18,12 +18,12 @@ from ahf_ros.detectors.claims import reported
 from ahf_ros.detectors.contract import DetectorSettings, FamilyDetector, moved_targets
 from ahf_ros.detectors.dots.discs import judged, small_discs, voted_discs, whole_discs
 from ahf_ros.detectors.dots.rings import CERTAIN, Rings, fit_targets, likely_targets, read_discs
-from ahf_ros.features.ellipse_targets import ellipse_fields
-from ahf_ros.features.frame import affine_frames, ellipse_axes
-from ahf_ros.features.large_targets import targets_of_octaves
-from ahf_ros.features.pyramid import ImagePyramid, Octave, image_pyramid
-from ahf_ros.imaging.image import as_gray, check_image
 from ahf_ros.prints.dots import DotFamily
+from ahf_ros.vision.ellipse_targets import ellipse_fields
+from ahf_ros.vision.frame import affine_frames, ellipse_axes
+from ahf_ros.vision.image import as_gray, check_image
+from ahf_ros.vision.large_targets import targets_of_octaves
+from ahf_ros.vision.pyramid import ImagePyramid, Octave, image_pyramid
 
 _PLAUSIBLE = 0.5  # share of the edges of disc and border
 _MAXIMUM_MOVE, _MAXIMUM_MOVE_SHARE = 1.0, 0.2  # that a centre is moved: px, radii

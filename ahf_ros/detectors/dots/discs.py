@@ -15,16 +15,16 @@ import cv2
 import numpy as np
 
 from ahf_ros.detectors.contract import DetectorSettings
-from ahf_ros.features.common_search import BLOBS
-from ahf_ros.features.dot_search import voted_dots, whole_dots
-from ahf_ros.features.dots import NO_DOTS, Dots, distinct
-from ahf_ros.features.frame import circle_outlines, ellipse_axes, enlarged, scaled
-from ahf_ros.features.log_edges import LOG_SCALE, LogEdges, mask_of
-from ahf_ros.features.pyramid import ImagePyramid
-from ahf_ros.features.robust import medians
-from ahf_ros.features.sampling import sample_circles
-from ahf_ros.features.small_dots import BLURRED, LARGEST, small_dots, small_dots_in
 from ahf_ros.prints.dots import DotFamily
+from ahf_ros.vision.common_search import BLOBS
+from ahf_ros.vision.dot_search import voted_dots, whole_dots
+from ahf_ros.vision.dots import NO_DOTS, Dots, distinct
+from ahf_ros.vision.frame import circle_outlines, ellipse_axes, enlarged, scaled
+from ahf_ros.vision.log_edges import LOG_SCALE, LogEdges, mask_of
+from ahf_ros.vision.pyramid import ImagePyramid
+from ahf_ros.vision.robust import medians
+from ahf_ros.vision.sampling import sample_circles
+from ahf_ros.vision.small_dots import BLURRED, LARGEST, small_dots, small_dots_in
 
 _STRAIGHT = 8.0  # length of an edge that is no small dot's, px of the image at half its size
 _TILE = 64  # side, px of the image at half its size

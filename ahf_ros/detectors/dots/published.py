@@ -23,12 +23,12 @@ import numpy as np
 from ahf_ros.base.target import UNDECODED, Target, sorted_targets
 from ahf_ros.detectors.claims import best_targets
 from ahf_ros.detectors.contract import DetectorSettings, FamilyDetector
-from ahf_ros.features.ellipse_targets import targets_from_frames
-from ahf_ros.features.frame import affine_frames, circle_points, project
-from ahf_ros.features.sampling import sample, within
-from ahf_ros.imaging.image import check_image, stretched_to_8_bit
-from ahf_ros.imaging.resampling import remapped
 from ahf_ros.prints.dots import DotFamily
+from ahf_ros.vision.ellipse_targets import targets_from_frames
+from ahf_ros.vision.frame import affine_frames, circle_points, project
+from ahf_ros.vision.image import check_image, stretched_to_8_bit
+from ahf_ros.vision.resampling import remapped
+from ahf_ros.vision.sampling import sample, within
 
 _LEVELS = 256  # of gray values
 _MINIMUM_CONTRAST = 20.0  # difference of the means of the two classes for a block to have any

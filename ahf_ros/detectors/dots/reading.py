@@ -8,12 +8,12 @@ import numpy as np
 
 from ahf_ros.detectors.dots.discs import border_steps
 from ahf_ros.detectors.expected import UNEXPECTED
-from ahf_ros.features.array_record import ArrayRecord
-from ahf_ros.features.circle_fit import Fit
-from ahf_ros.features.dot_evidence import PIXELS_ASIDE, circle_sides, dot_evidence
-from ahf_ros.features.homography import local_frames
 from ahf_ros.prints.cyclic import mirrored_words, rotated_words
 from ahf_ros.prints.dots import DotFamily
+from ahf_ros.vision.array_record import ArrayRecord
+from ahf_ros.vision.circle_fit import Fit
+from ahf_ros.vision.dot_evidence import PIXELS_ASIDE, circle_sides, dot_evidence
+from ahf_ros.vision.homography import local_frames
 
 _PHASES = 12  # of the ring, in the angle from one place to the next
 _SHRUNK = np.array([0.5, 0.63, 0.8, 1.0])  # radii that small dots may have, in the printed one

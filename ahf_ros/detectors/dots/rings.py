@@ -20,16 +20,16 @@ from ahf_ros.base.target import UNDECODED, DottedTarget
 from ahf_ros.detectors.claims import best_of_places
 from ahf_ros.detectors.contract import DetectorSettings
 from ahf_ros.detectors.dots.reading import Readings, dot_points, expecting, read_rings
-from ahf_ros.features.array_record import ArrayRecord
-from ahf_ros.features.circle_fit import Fit, fit_circles_of_any_blur
-from ahf_ros.features.circles import Circles
-from ahf_ros.features.dots import Dots
-from ahf_ros.features.ellipse_targets import ellipse_fields
-from ahf_ros.features.frame import ellipse_axes, mean_radii
-from ahf_ros.features.homography import local_frames
-from ahf_ros.features.logistic import logistic, read_weights
-from ahf_ros.features.pyramid import ImagePyramid
 from ahf_ros.prints.dots import DotFamily
+from ahf_ros.vision.array_record import ArrayRecord
+from ahf_ros.vision.circle_fit import Fit, fit_circles_of_any_blur
+from ahf_ros.vision.circles import Circles
+from ahf_ros.vision.dots import Dots
+from ahf_ros.vision.ellipse_targets import ellipse_fields
+from ahf_ros.vision.frame import ellipse_axes, mean_radii
+from ahf_ros.vision.homography import local_frames
+from ahf_ros.vision.logistic import logistic, read_weights
+from ahf_ros.vision.pyramid import ImagePyramid
 
 _RAYS = 40  # round each circle
 _REACH = 0.3  # how far from a circle its edge is looked for, radii of the disc: half the border

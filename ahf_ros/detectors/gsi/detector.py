@@ -43,16 +43,16 @@ from ahf_ros.detectors.gsi.refinement import (
     resized,
 )
 from ahf_ros.detectors.undecoded import undecoded
-from ahf_ros.features import frame
-from ahf_ros.features.dot_search import voted_dots, whole_dots
-from ahf_ros.features.dots import Dots, distinct
-from ahf_ros.features.ellipse_targets import ellipse_fields, targets_from_frames
-from ahf_ros.features.homography import local_frames
-from ahf_ros.features.large_targets import targets_of_octaves
-from ahf_ros.features.pyramid import ImagePyramid, Octave, image_pyramid
-from ahf_ros.features.small_dots import small_dots_in
-from ahf_ros.imaging.image import as_gray, check_image
 from ahf_ros.prints.gsi import PointFamily
+from ahf_ros.vision import frame
+from ahf_ros.vision.dot_search import voted_dots, whole_dots
+from ahf_ros.vision.dots import Dots, distinct
+from ahf_ros.vision.ellipse_targets import ellipse_fields, targets_from_frames
+from ahf_ros.vision.homography import local_frames
+from ahf_ros.vision.image import as_gray, check_image
+from ahf_ros.vision.large_targets import targets_of_octaves
+from ahf_ros.vision.pyramid import ImagePyramid, Octave, image_pyramid
+from ahf_ros.vision.small_dots import small_dots_in
 
 _MARGIN = 0.5  # about the dots of certain targets, dot radii
 _WHOLE_MARGIN = 0.4  # about a dot whose outline is whole, dot radii

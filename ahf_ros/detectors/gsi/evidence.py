@@ -13,14 +13,14 @@ import numpy as np
 
 from ahf_ros.detectors.expected import against
 from ahf_ros.detectors.gsi.grouping import Templates
-from ahf_ros.features.array_record import ArrayRecord
-from ahf_ros.features.dot_evidence import circle_sides, dot_evidence, independent_rays
-from ahf_ros.features.frame import ellipse_axes
-from ahf_ros.features.homography import local_frames
-from ahf_ros.features.robust import median
-from ahf_ros.imaging.black import black_lift, lifted
-from ahf_ros.imaging.logarithm import LOG_OFFSET
 from ahf_ros.prints.gsi import PointFamily
+from ahf_ros.vision.array_record import ArrayRecord
+from ahf_ros.vision.black import black_lift, lifted
+from ahf_ros.vision.dot_evidence import circle_sides, dot_evidence, independent_rays
+from ahf_ros.vision.frame import ellipse_axes
+from ahf_ros.vision.homography import local_frames
+from ahf_ros.vision.logarithm import LOG_OFFSET
+from ahf_ros.vision.robust import median
 
 _MINIMUM_STEP = 0.12  # step of ln of a dot
 _MINIMUM_DARK_STEP = 0.02  # the same where there is hardly any light

@@ -17,12 +17,12 @@ from itertools import pairwise
 import cv2
 import numpy as np
 
-from ahf_ros.features import frame
-from ahf_ros.features.array_record import ArrayRecord
-from ahf_ros.features.dots import Dots, pairs_within
-from ahf_ros.features.homography import fit_homographies, local_frames
-from ahf_ros.features.robust import median
 from ahf_ros.prints.gsi import PointFamily
+from ahf_ros.vision import frame
+from ahf_ros.vision.array_record import ArrayRecord
+from ahf_ros.vision.dots import Dots, pairs_within
+from ahf_ros.vision.homography import fit_homographies, local_frames
+from ahf_ros.vision.robust import median
 
 FEW = 600  # dots of one polarity, up to which all template dots are tried in all roles
 

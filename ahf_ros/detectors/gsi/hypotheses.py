@@ -15,11 +15,11 @@ from ahf_ros.detectors.claims import Rivals, owners
 from ahf_ros.detectors.gsi.evidence import Readings
 from ahf_ros.detectors.gsi.grouping import Templates
 from ahf_ros.detectors.gsi.refinement import Placement
-from ahf_ros.features.array_record import ArrayRecord
-from ahf_ros.features.frame import ellipse_axes
-from ahf_ros.features.homography import reference_frames
-from ahf_ros.features.logistic import logistic, read_weights
 from ahf_ros.prints.gsi import PointFamily
+from ahf_ros.vision.array_record import ArrayRecord
+from ahf_ros.vision.frame import ellipse_axes
+from ahf_ros.vision.homography import reference_frames
+from ahf_ros.vision.logistic import logistic, read_weights
 
 WEIGHTS = Path(__file__).with_name('fitted_weights.json')
 CERTAIN = 0.95  # confidence from which a target is reported

@@ -34,9 +34,9 @@ import numpy as np
 from ahf_ros.base.target import UNDECODED, DottedTarget, Target, sorted_targets
 from ahf_ros.detectors.claims import best_targets
 from ahf_ros.detectors.contract import FamilyDetector
-from ahf_ros.features.array_record import ArrayRecord
-from ahf_ros.imaging.image import as_gray, check_image
 from ahf_ros.prints.gsi import PointFamily
+from ahf_ros.vision.array_record import ArrayRecord
+from ahf_ros.vision.image import as_gray, check_image
 
 _MAXIMUM_BIAS = 1.0
 # Distance h of a dot from its position that is accepted, in the unit of the printed design, mm.

@@ -10,14 +10,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ahf_ros.features.circle_fit import ENOUGH, fit_circles_of_any_blur
-from ahf_ros.features.circles import dot_circles
-from ahf_ros.features.dots import Dots
-from ahf_ros.features.frame import ellipse_axes, mean_radii, project
-from ahf_ros.features.homography import fit_homographies, local_frames
-from ahf_ros.features.robust import median
-from ahf_ros.features.sampling import sample_circles
-from ahf_ros.imaging.black import black_lift
+from ahf_ros.vision.black import black_lift
+from ahf_ros.vision.circle_fit import ENOUGH, fit_circles_of_any_blur
+from ahf_ros.vision.circles import dot_circles
+from ahf_ros.vision.dots import Dots
+from ahf_ros.vision.frame import ellipse_axes, mean_radii, project
+from ahf_ros.vision.homography import fit_homographies, local_frames
+from ahf_ros.vision.robust import median
+from ahf_ros.vision.sampling import sample_circles
 
 _RAYS = 32  # about a dot
 _SIZES, _REACHES = np.array([0.5, 1.1, 2.3]), np.array([1.9, 0.95, 0.45])

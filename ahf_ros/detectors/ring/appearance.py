@@ -13,9 +13,9 @@ import numpy as np
 from ahf_ros.detectors.ring.decoding import Words, bits_at, lengthened
 from ahf_ros.detectors.ring.light import clear_of
 from ahf_ros.detectors.ring.polar import LIGHT_EDGE, SOFT_EDGE, PolarImages, angles_of
-from ahf_ros.features.robust import fit_linear
-from ahf_ros.imaging.logarithm import LOG_OFFSET
 from ahf_ros.prints.ring import Family
+from ahf_ros.vision.logarithm import LOG_OFFSET
+from ahf_ros.vision.robust import fit_linear
 
 _MINIMUM_ASIDE = 1.0  # distance from an edge at which it ends, px
 _INMOST = 0.5  # of the dot, whose ink is that of marks where light is even, dot radii

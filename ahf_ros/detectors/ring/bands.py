@@ -21,17 +21,17 @@ from ahf_ros.base.blas import one_blas_thread
 from ahf_ros.detectors.claims import owners
 from ahf_ros.detectors.contract import DetectorSettings
 from ahf_ros.detectors.ring.polar import angles_of
-from ahf_ros.features import frame
-from ahf_ros.features.array_record import ArrayRecord
-from ahf_ros.features.circle_fit import ENOUGH, NO_FITS, Fit, fit_dots
-from ahf_ros.features.dot_search import voted_dots, whole_dots
-from ahf_ros.features.dots import Dots
-from ahf_ros.features.pyramid import Octave, image_pyramid, octaves
-from ahf_ros.features.robust import NORMAL, median
-from ahf_ros.features.sampling import sample_circles
-from ahf_ros.imaging.image import as_gray, as_light, check_image
 from ahf_ros.prints import RING_NAMES
 from ahf_ros.prints.ring import Family, Radii
+from ahf_ros.vision import frame
+from ahf_ros.vision.array_record import ArrayRecord
+from ahf_ros.vision.circle_fit import ENOUGH, NO_FITS, Fit, fit_dots
+from ahf_ros.vision.dot_search import voted_dots, whole_dots
+from ahf_ros.vision.dots import Dots
+from ahf_ros.vision.image import as_gray, as_light, check_image
+from ahf_ros.vision.pyramid import Octave, image_pyramid, octaves
+from ahf_ros.vision.robust import NORMAL, median
+from ahf_ros.vision.sampling import sample_circles
 
 MINIMUM_TARGETS = 5
 """Targets of a family from which it is learnt; twenty tell it well."""

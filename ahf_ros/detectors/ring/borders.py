@@ -15,9 +15,9 @@ import numpy as np
 from ahf_ros.detectors.ring.decoding import Words, bits_at
 from ahf_ros.detectors.ring.likelihood import normal
 from ahf_ros.detectors.ring.polar import DEPTHS, PolarImages
-from ahf_ros.features.robust import fit_linear, median
-from ahf_ros.imaging.logarithm import LOG_OFFSET
 from ahf_ros.prints.ring import Family
+from ahf_ros.vision.logarithm import LOG_OFFSET
+from ahf_ros.vision.robust import fit_linear, median
 
 _BESIDE = 3  # angles on either side of a border
 _CONTRAST = 0.5  # share of the step of a mark, from which a border is seen

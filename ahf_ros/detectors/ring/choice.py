@@ -17,8 +17,8 @@ from ahf_ros.detectors.ring.hypotheses import Hypotheses
 from ahf_ros.detectors.ring.proposals import HOPEFUL, Print, bounds, measure_likely
 from ahf_ros.detectors.ring.reading import read_bands
 from ahf_ros.detectors.ring.rivals import has_all
-from ahf_ros.features.circle_fit import ENOUGH, Fit
 from ahf_ros.prints.ring import Family
+from ahf_ros.vision.circle_fit import ENOUGH, Fit
 
 _CLEAREST = 32  # dots that tell the family of an image
 _OTHERS = 2048  # clearest ones of the others: texture and letters have thousands

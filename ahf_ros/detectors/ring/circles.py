@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ahf_ros.features.circles import Circles, dot_circles
 from ahf_ros.prints.ring import Family
+from ahf_ros.vision.circles import Circles, dot_circles
 
 REACH = 0.45
 """Distance from an expected edge to look for it, dot radii: less than half a gap.

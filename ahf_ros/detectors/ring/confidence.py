@@ -17,8 +17,8 @@ from pathlib import Path
 import numpy as np
 
 from ahf_ros.detectors.ring.hypotheses import Hypotheses
-from ahf_ros.features.logistic import logistic, read_weights
 from ahf_ros.prints.ring import borders, marks
+from ahf_ros.vision.logistic import logistic, read_weights
 
 COVERED = 0.25
 """Share of sectors that covers hide at the most where they leave even ground beyond a band."""

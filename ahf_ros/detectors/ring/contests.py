@@ -10,8 +10,8 @@ from ahf_ros.detectors.claims import Rivals, leading, owners, sole_owners, surer
 from ahf_ros.detectors.ring.confidence import COVERED
 from ahf_ros.detectors.ring.decoding import CLEAR
 from ahf_ros.detectors.ring.hypotheses import Hypotheses
-from ahf_ros.features import frame
-from ahf_ros.features.shape_votes import NEIGHBOURS
+from ahf_ros.vision import frame
+from ahf_ros.vision.shape_votes import NEIGHBOURS
 
 _CLEARLY = 2.0  # times the evidence of another claim to the same dot
 _FOREIGN = 10.0  # log odds of arcs of any length against a word, which is none then

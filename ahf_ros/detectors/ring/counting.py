@@ -18,8 +18,8 @@ from ahf_ros.detectors.ring.contests import on_targets
 from ahf_ros.detectors.ring.decoding import CLEAR
 from ahf_ros.detectors.ring.detector import find_hypotheses
 from ahf_ros.detectors.ring.hypotheses import CERTAIN
-from ahf_ros.features import frame
-from ahf_ros.imaging.image import as_gray, check_image
+from ahf_ros.vision import frame
+from ahf_ros.vision.image import as_gray, check_image
 
 _OF_WORDS = 0.5  # of what speaks against a word, which counts against a target
 

@@ -15,9 +15,9 @@ import numpy as np
 
 from ahf_ros.detectors.ring.codewords import best_words, likeliest_bits, margins, prior
 from ahf_ros.detectors.ring.likelihood import SURPRISES, Evidence
-from ahf_ros.features.array_record import ArrayRecord
-from ahf_ros.features.normal import normal_integral
 from ahf_ros.prints.ring import Family, canonical
+from ahf_ros.vision.array_record import ArrayRecord
+from ahf_ros.vision.normal import normal_integral
 
 _MAXIMUM_READING = 5.0  # for or against a word
 _LIKE_PAPER = 8.5  # the same of something that looks like paper

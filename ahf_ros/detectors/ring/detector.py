@@ -39,13 +39,13 @@ from ahf_ros.detectors.ring.proposals import (
 )
 from ahf_ros.detectors.ring.refinement import refine_centres
 from ahf_ros.detectors.undecoded import undecoded
-from ahf_ros.features import frame
-from ahf_ros.features.circle_fit import NO_FITS, Fit
-from ahf_ros.features.ellipse_targets import targets_from_frames
-from ahf_ros.features.pyramid import ImagePyramid, Octave, image_pyramid, octaves
-from ahf_ros.imaging.faint import faint_parts
-from ahf_ros.imaging.image import as_gray, check_image
 from ahf_ros.prints.ring import Family
+from ahf_ros.vision import frame
+from ahf_ros.vision.circle_fit import NO_FITS, Fit
+from ahf_ros.vision.ellipse_targets import targets_from_frames
+from ahf_ros.vision.faint import faint_parts
+from ahf_ros.vision.image import as_gray, check_image
+from ahf_ros.vision.pyramid import ImagePyramid, Octave, image_pyramid, octaves
 
 _PART = 128  # dots of one colour that are read at a time
 _IN_PLACE, _EXACT = 0.6, 0.5  # edges of a dot: least share of them, largest deviation, px

@@ -19,9 +19,9 @@ from ahf_ros.detectors.ring.hypotheses import Hypotheses
 from ahf_ros.detectors.ring.known import NOTHING_KNOWN, Prior
 from ahf_ros.detectors.ring.reading import read_bands
 from ahf_ros.detectors.ring.rivals import against_rivals, has_all, odds
-from ahf_ros.features import frame
-from ahf_ros.features.circle_fit import Fit
 from ahf_ros.prints.ring import Family, canonical, words_of_prints
+from ahf_ros.vision import frame
+from ahf_ros.vision.circle_fit import Fit
 
 _DOUBT = 0.05  # odds of another family that has all prints, up to which one is sure
 _ALL_WORDS = 0.5  # odds of a family of all words against one of a rule, before any print is seen

@@ -16,8 +16,8 @@ import numpy as np
 from ahf_ros.detectors.ring.circles import reach_of, target_circles
 from ahf_ros.detectors.ring.hypotheses import Hypotheses
 from ahf_ros.detectors.ring.reading import PER_SECTOR
-from ahf_ros.features import frame
-from ahf_ros.features.circle_fit import ENOUGH, SOFT, fit_circles_of_any_blur
+from ahf_ros.vision import frame
+from ahf_ros.vision.circle_fit import ENOUGH, SOFT, fit_circles_of_any_blur
 
 
 def at_full_size(images: Sequence[np.ndarray], read: Hypotheses) -> Hypotheses:

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from ahf_ros.detectors.ring.decoding import Words
-from ahf_ros.features import frame
-from ahf_ros.features.array_record import ArrayRecord
-from ahf_ros.features.circle_fit import Fit
-from ahf_ros.features.growth import growth_in_light
 from ahf_ros.prints.ring import Family
+from ahf_ros.vision import frame
+from ahf_ros.vision.array_record import ArrayRecord
+from ahf_ros.vision.circle_fit import Fit
+from ahf_ros.vision.growth import growth_in_light
 
 CERTAIN = 0.75
 """Confidence from which words are reported."""

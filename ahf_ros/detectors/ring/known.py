@@ -12,13 +12,13 @@ import numpy as np
 
 from ahf_ros.detectors.ring.circles import REACH
 from ahf_ros.detectors.ring.hypotheses import Hypotheses
-from ahf_ros.features import frame
-from ahf_ros.features.array_record import ArrayRecord
-from ahf_ros.features.dots import NO_DOTS, Dots
-from ahf_ros.features.log_edges import mask_of
-from ahf_ros.features.pyramid import MAXIMUM_RADIUS, Octave
-from ahf_ros.features.robust import NORMAL
-from ahf_ros.features.shape_votes import dots_in_shapes
+from ahf_ros.vision import frame
+from ahf_ros.vision.array_record import ArrayRecord
+from ahf_ros.vision.dots import NO_DOTS, Dots
+from ahf_ros.vision.log_edges import mask_of
+from ahf_ros.vision.pyramid import MAXIMUM_RADIUS, Octave
+from ahf_ros.vision.robust import NORMAL
+from ahf_ros.vision.shape_votes import dots_in_shapes
 
 WHOLE = 0.9
 """Share of the edge of a dot that is explained, or reported, without a word."""

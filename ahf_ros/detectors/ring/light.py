@@ -12,11 +12,11 @@ from functools import lru_cache
 
 import numpy as np
 
-from ahf_ros.features import frame
-from ahf_ros.features.sampling import sample
-from ahf_ros.imaging.black import lifted
-from ahf_ros.imaging.logarithm import LOG_OFFSET
 from ahf_ros.prints.ring import Radii
+from ahf_ros.vision import frame
+from ahf_ros.vision.black import lifted
+from ahf_ros.vision.logarithm import LOG_OFFSET
+from ahf_ros.vision.sampling import sample
 
 _CELLS, _TRANSFORM = 64, 96  # sides of the rectified target and of its transforms
 _MARGIN = 0.85  # beyond the band, dot radii

@@ -20,12 +20,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from ahf_ros.detectors.ring.polar import CORRELATION, LIGHT_EDGE, PolarImages
-from ahf_ros.features.array_record import ArrayRecord
-from ahf_ros.features.circle_fit import SOFT
-from ahf_ros.features.normal import normal_integral
-from ahf_ros.features.robust import medians
-from ahf_ros.imaging.image import SATURATED
-from ahf_ros.imaging.logarithm import LOG_OFFSET
+from ahf_ros.vision.array_record import ArrayRecord
+from ahf_ros.vision.circle_fit import SOFT
+from ahf_ros.vision.image import SATURATED
+from ahf_ros.vision.logarithm import LOG_OFFSET
+from ahf_ros.vision.normal import normal_integral
+from ahf_ros.vision.robust import medians
 
 _BESIDE = 2.6  # distance of a reading from an edge that is sharp, px
 _MINIMUM_BESIDE, _MAXIMUM_BESIDE = 0.13, 0.36  # bounds of that distance, dot radii

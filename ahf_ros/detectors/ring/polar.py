@@ -7,17 +7,17 @@ from functools import lru_cache
 
 import numpy as np
 
-from ahf_ros.features import frame
-from ahf_ros.features.array_record import ArrayRecord
-from ahf_ros.features.circle_fit import Fit
-from ahf_ros.features.noise import reading_noise
-from ahf_ros.features.normal import normal_integral
-from ahf_ros.features.profiles import USUAL_BLUR
-from ahf_ros.features.robust import NORMAL, medians
-from ahf_ros.features.sampling import sample_circles, within
-from ahf_ros.imaging.black import black_lift, lifted
-from ahf_ros.imaging.image import SATURATED
-from ahf_ros.imaging.logarithm import LOG_OFFSET
+from ahf_ros.vision import frame
+from ahf_ros.vision.array_record import ArrayRecord
+from ahf_ros.vision.black import black_lift, lifted
+from ahf_ros.vision.circle_fit import Fit
+from ahf_ros.vision.image import SATURATED
+from ahf_ros.vision.logarithm import LOG_OFFSET
+from ahf_ros.vision.noise import reading_noise
+from ahf_ros.vision.normal import normal_integral
+from ahf_ros.vision.profiles import USUAL_BLUR
+from ahf_ros.vision.robust import NORMAL, medians
+from ahf_ros.vision.sampling import sample_circles, within
 
 CORRELATION = 2.5
 """Distance of independent readings, px."""
@@ -67,7 +67,7 @@ class PolarImages(ArrayRecord):
     Attributes
     ----------
     gray : ndarray of float32, shape (i, m, n)
-        Of i images; black is lifted, see `ahf_ros.imaging.black`.
+        Of i images; black is lifted, see `ahf_ros.vision.black`.
     row : ndarray of int, shape (k,)
         Which of these images is that of a dot.
     reach : ndarray of float64, shape (k, m)

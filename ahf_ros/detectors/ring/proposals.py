@@ -27,14 +27,14 @@ from ahf_ros.detectors.ring.polar import (
     on_dark_ground,
     polar_images,
 )
-from ahf_ros.features import frame
-from ahf_ros.features.circle_fit import ENOUGH, NO_FITS, Fit, fit_dots
-from ahf_ros.features.dot_search import voted_dots, whole_dots
-from ahf_ros.features.dots import NO_DOTS, Dots
-from ahf_ros.features.pyramid import Octave
-from ahf_ros.features.robust import medians
-from ahf_ros.features.small_dots import small_dots_in
 from ahf_ros.prints.ring import Family, least_marked
+from ahf_ros.vision import frame
+from ahf_ros.vision.circle_fit import ENOUGH, NO_FITS, Fit, fit_dots
+from ahf_ros.vision.dot_search import voted_dots, whole_dots
+from ahf_ros.vision.dots import NO_DOTS, Dots
+from ahf_ros.vision.pyramid import Octave
+from ahf_ros.vision.robust import medians
+from ahf_ros.vision.small_dots import small_dots_in
 
 _MOST_ALIKE = 64  # dots in the shapes of targets that are looked at
 _THIN = 4.0  # semi-minor axis of a dot whose gap edges of a half may not show, px

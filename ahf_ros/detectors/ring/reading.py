@@ -40,11 +40,11 @@ from ahf_ros.detectors.ring.polar import (
     on_dark_ground,
     polar_images,
 )
-from ahf_ros.features import frame
-from ahf_ros.features.circle_fit import ENOUGH, Fit, fit_circles
-from ahf_ros.features.sampling import sample_circles
-from ahf_ros.imaging.black import lifted
 from ahf_ros.prints.ring import Family, least_marked
+from ahf_ros.vision import frame
+from ahf_ros.vision.black import lifted
+from ahf_ros.vision.circle_fit import ENOUGH, Fit, fit_circles
+from ahf_ros.vision.sampling import sample_circles
 
 PER_SECTOR = 10
 """Angles of a sector at which bands are read."""

@@ -18,11 +18,11 @@ from ahf_ros.detectors.ring.full_size import with_soft_edges
 from ahf_ros.detectors.ring.hypotheses import Hypotheses
 from ahf_ros.detectors.ring.known import Prior
 from ahf_ros.detectors.ring.reading import read_bands
-from ahf_ros.features import frame
-from ahf_ros.features.circle_fit import ENOUGH, Fit, fit_dots
-from ahf_ros.features.ellipse_targets import ellipse_fields
-from ahf_ros.imaging.image import as_gray, check_image
 from ahf_ros.prints.ring import Family, canonical
+from ahf_ros.vision import frame
+from ahf_ros.vision.circle_fit import ENOUGH, Fit, fit_dots
+from ahf_ros.vision.ellipse_targets import ellipse_fields
+from ahf_ros.vision.image import as_gray, check_image
 
 _MAXIMUM_MOVE, _MAXIMUM_MOVE_SHARE = 1.0, 0.2  # that a centre is moved: px, or radii of its dot
 

@@ -20,8 +20,8 @@ from ahf_ros.detectors.ring.known import Prior
 from ahf_ros.detectors.ring.likelihood import SHARES, edge_evidence
 from ahf_ros.detectors.ring.polar import polar_images
 from ahf_ros.detectors.ring.reading import best_growth, read_bands
-from ahf_ros.features.circle_fit import Fit
 from ahf_ros.prints.ring import FAMILY_NAMES, Family, family
+from ahf_ros.vision.circle_fit import Fit
 
 _FIRST = 8  # doubtful words that rivals read first
 _MORE_SEEN = 6.0  # log odds against anything, by which a family that is not read beats one that is

@@ -24,10 +24,10 @@ from ahf_ros.detectors.square.prints import lay_outlines, lay_prints
 from ahf_ros.detectors.square.quadrilaterals import find_quadrilaterals
 from ahf_ros.detectors.square.reading import MINIMUM_ODDS, read
 from ahf_ros.detectors.undecoded import undecoded
-from ahf_ros.features.frame import reduced
-from ahf_ros.features.pyramid import halved
-from ahf_ros.imaging.image import as_gray, check_image
 from ahf_ros.prints.square import are_plain, words
+from ahf_ros.vision.frame import reduced
+from ahf_ros.vision.image import as_gray, check_image
+from ahf_ros.vision.pyramid import halved
 
 # Of a centre from contours where nothing else can be fitted, in sides: on paper with waves of 0.5
 # to 3 px, 0.021 of 169 markers and 0.032 of 85, none beyond three of these. On flat and on bent

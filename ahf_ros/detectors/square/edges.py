@@ -26,17 +26,17 @@ from ahf_ros.detectors.square.frames import (
     side_lengths,
     square_frames,
 )
-from ahf_ros.features.edge_errors import common_slope, smooth_slopes, weigh_edges
-from ahf_ros.features.frame import project
-from ahf_ros.features.growth import growth_in_light
-from ahf_ros.features.profiles import (
+from ahf_ros.vision.edge_errors import common_slope, smooth_slopes, weigh_edges
+from ahf_ros.vision.frame import project
+from ahf_ros.vision.growth import growth_in_light
+from ahf_ros.vision.profiles import (
     BLURS,
     USUAL_BLUR,
     Edges,
     OutlinePoints,
     measure_outlines,
 )
-from ahf_ros.features.robust import geman_mcclure_gain, median, reweight, spread
+from ahf_ros.vision.robust import geman_mcclure_gain, median, reweight, spread
 
 _ALONG = np.array([0.25, 0.5, 0.75])  # where edges are measured along a cell
 _REACH = 0.45  # of profiles, in cells, as the next edge is that far

@@ -14,8 +14,8 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from ahf_ros.features.array_record import ArrayRecord
-from ahf_ros.features.frame import local_affine
+from ahf_ros.vision.array_record import ArrayRecord
+from ahf_ros.vision.frame import local_affine
 
 SQUARE = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])
 """Corners of the square about the origin with sides of 1."""

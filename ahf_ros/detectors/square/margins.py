@@ -15,8 +15,8 @@ from functools import lru_cache
 import numpy as np
 
 from ahf_ros.detectors.square.frames import square_frames
-from ahf_ros.features.frame import project
-from ahf_ros.features.sampling import sample
+from ahf_ros.vision.frame import project
+from ahf_ros.vision.sampling import sample
 
 
 def decision_margins(

@@ -33,12 +33,12 @@ from ahf_ros.detectors.square.frames import (
     side_lengths,
     square_frames,
 )
-from ahf_ros.features.frame import project
-from ahf_ros.features.growth import growth_in_light
-from ahf_ros.features.normal import normal_integral
-from ahf_ros.features.profiles import USUAL_BLUR
-from ahf_ros.features.robust import NORMAL, geman_mcclure, geman_mcclure_gain
-from ahf_ros.features.sampling import sample, within
+from ahf_ros.vision.frame import project
+from ahf_ros.vision.growth import growth_in_light
+from ahf_ros.vision.normal import normal_integral
+from ahf_ros.vision.profiles import USUAL_BLUR
+from ahf_ros.vision.robust import NORMAL, geman_mcclure, geman_mcclure_gain
+from ahf_ros.vision.sampling import sample, within
 
 _CELLS = 8  # of a marker whose cells are not known
 _MARGIN = 0.6  # of paper around a print that is looked at, cells

@@ -15,9 +15,9 @@ import cv2
 import numpy as np
 
 from ahf_ros.detectors.square.frames import meet
-from ahf_ros.features.outlines import measured, points_of
-from ahf_ros.features.sampling import sample
-from ahf_ros.imaging.logarithm import LOG_OFFSET
+from ahf_ros.vision.logarithm import LOG_OFFSET
+from ahf_ros.vision.outlines import measured, points_of
+from ahf_ros.vision.sampling import sample
 
 _WINDOW = 13  # in which a pixel is compared, px
 _MINIMUM_STEP = 24  # from the darkest to the brightest pixel of a window, of 255

@@ -25,10 +25,10 @@ import numpy as np
 from ahf_ros.detectors.expected import against as of_expected
 from ahf_ros.detectors.square.frames import side_lengths, square_frames
 from ahf_ros.detectors.square.shapes import corner_odds, parallel_odds
-from ahf_ros.features.frame import project
-from ahf_ros.features.sampling import sample
-from ahf_ros.imaging.logarithm import LOG_OFFSET
 from ahf_ros.prints.square import borders, corner_counts, words
+from ahf_ros.vision.frame import project
+from ahf_ros.vision.logarithm import LOG_OFFSET
+from ahf_ros.vision.sampling import sample
 
 _IN_CELL = ((0.0, 0.0), (-0.2, -0.2), (-0.2, 0.2), (0.2, -0.2), (0.2, 0.2))
 """Where a cell is sampled, from its centre, in cells."""

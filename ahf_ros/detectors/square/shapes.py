@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from ahf_ros.detectors.square.frames import derivatives
-from ahf_ros.features.normal import normal_integral
+from ahf_ros.vision.normal import normal_integral
 
 _CORNER_ERROR = 1.0  # of the lengths of opposite sides, as corners are known to half a pixel, px
 _FOCAL_LENGTH = 1.0  # about that of a camera, in image widths

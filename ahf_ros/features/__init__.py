@@ -1,1 +1,0 @@
-"""Finding and measuring targets of any family; no family is known here."""

@@ -1,0 +1,80 @@
+"""Gray values of an image at points, on lines and on circles."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ahf_ros.vision.resampling import remapped
+
+_REMAP_ROWS = 16384  # cv2.remap takes maps of at most 32767 rows
+
+
+def sample(image: np.ndarray, pixels: np.ndarray) -> np.ndarray:
+    """Return the bilinearly interpolated values of an image at pixels, shape (..., 2).
+
+    The image is of uint8, uint16, int16 or float32, as are the values, shape (...). Beyond the
+    border the nearest pixel counts.
+    """
+    columns = pixels.shape[-2]
+    maps = np.ascontiguousarray(pixels, np.float32).reshape(-1, columns, 2)
+    values = np.empty(maps.shape[:2], image.dtype)
+    for start in range(0, len(maps), _REMAP_ROWS):
+        rows = slice(start, start + _REMAP_ROWS)
+        values[rows] = remapped(image, maps[rows], None)
+    return values.reshape(pixels.shape[:-1])
+
+
+def sample_lines(
+    image: np.ndarray, middles: np.ndarray, directions: np.ndarray, along: np.ndarray
+) -> np.ndarray:
+    """Return the values of an image on straight lines as `sample` does, shape (k, n).
+
+    The directions, px, shape (k, 2) as the middles, lead from these to the point at 1 along the
+    line; values are taken at places `along` it, shape (n,).
+    """
+    x, y = middles.T.astype(np.float32)[..., None]
+    across, down = directions.T.astype(np.float32)[..., None]
+    along = along.astype(np.float32)
+    values = np.empty((len(middles), len(along)), image.dtype)
+    for start in range(0, len(values), _REMAP_ROWS):
+        rows = slice(start, start + _REMAP_ROWS)
+        values[rows] = remapped(
+            image, x[rows] + across[rows] * along, y[rows] + down[rows] * along
+        )
+    return values
+
+
+def sample_circles(
+    image: np.ndarray, frames: np.ndarray, angles: np.ndarray, radii: np.ndarray
+) -> np.ndarray:
+    """Return the values of an image on concentric circles of targets.
+
+    It does what `sample` does for the projected `frame.circle_points`, in single precision and in
+    parts that stay in the cache. Radii of shape (n,) are the same for all k frames, those of shape
+    (k, n) are others for each; with m angles, the values have the shape (k, m, n).
+    """
+    directions = np.stack([np.cos(angles), np.sin(angles)])
+    radii = np.broadcast_to(radii, (len(frames), np.shape(radii)[-1])).astype(np.float32)
+    values = np.empty((len(frames), len(angles), radii.shape[1]), image.dtype)
+    affine = bool((frames[:, 2] == (0, 0, 1)).all())
+    step = max(1, _REMAP_ROWS // len(angles))
+    for start in range(0, len(frames), step):
+        part = slice(start, start + step)
+        along = (frames[part, :, :2] @ directions).astype(np.float32)[..., None]
+        centre = frames[part, :, 2].astype(np.float32)[..., None, None]
+        rows = [along[:, row] * radii[part, None] for row in range(2 if affine else 3)]
+        for row, points in enumerate(rows):
+            points += centre[:, row]
+        across, down, *scale = rows
+        for points in (across, down) if scale else ():
+            points /= scale[0]
+        shape = (across.shape[0] * across.shape[1], -1)
+        sampled = remapped(image, across.reshape(shape), down.reshape(shape))
+        values[part] = sampled.reshape(across.shape)
+    return values
+
+
+def within(pixels: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
+    """Return whether pixels, shape (..., 2), lie in an image of shape (height, width)."""
+    x, y = pixels[..., 0], pixels[..., 1]
+    return (x >= 0) & (y >= 0) & (x <= shape[1] - 1) & (y <= shape[0] - 1)

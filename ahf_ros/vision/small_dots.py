@@ -1,0 +1,215 @@
+"""Small dots in even light: blobs of the logarithm of the image, at full resolution.
+
+Dots of a few pixels, and those seen at steep angles, have no outline that edges could be followed
+along. In even light they need none.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from functools import partial
+
+import cv2
+import numpy as np
+
+from ahf_ros.vision.common_search import BLOBS, dots_in_common
+from ahf_ros.vision.dots import NO_DOTS, Dots, best
+from ahf_ros.vision.frame import affine_frames, translated
+from ahf_ros.vision.log_edges import LOG_SCALE
+from ahf_ros.vision.pyramid import ImagePyramid
+
+LARGEST = 12.0
+"""Semi-major axis up to which dots are looked for as blobs, px."""
+
+BLURRED = 0.8
+"""Radius of a blob whose edge is blurred, in radii of the smallest dot."""
+
+MAXIMUM_BLOBS = 20_000
+"""Small dots kept at the most of a strip, those with the highest contrast."""
+
+_LN_RANGE = 3.6  # of ln(I + 8) for gray values of 8 bit
+_MINIMUM_STEP = 0.2  # of ln, from the ground to the dot
+_LEVELS = {-1: 0.62, 1: 0.4}  # of the step of ln, about halfway in gray values
+_REDUCTION = 4  # of the image in which the ground is looked for
+_REACH = 4  # px about a pixel, in which the highest step is looked for
+_NEAR = np.ones((2 * _REACH + 1, 2 * _REACH + 1), np.uint8)
+_BESIDE = np.ones((1, 3), np.uint8)
+_BLUR = 0.15  # px^2, variance that blur adds to a dot that is cut off at half of its height
+_MINIMUM_MINOR = 0.6  # px
+_MINIMUM_PIXELS = 4
+_FILLED = (0.7, 1.35)  # pixels of a dot over the area of its ellipse
+_STRIP = 2**22  # pixels looked at at a time, so that memory is used again, not made anew
+_TILE = 32  # side of a tile, px; empty tiles are left out
+_MAXIMUM_TILES = 0.3  # of the image; where there are more, it is looked at as a whole
+
+
+def small_dots_in(
+    pyramid: ImagePyramid,
+    min_radius: float,
+    max_radius: float,
+    polarities: Sequence[int],
+    explained: Sequence[np.ndarray] | np.ndarray = (),
+) -> Dots:
+    """Return the `small_dots` of an image, which detectors may share."""
+    if min_radius >= LARGEST:
+        return NO_DOTS
+    search = partial(small_dots, pyramid.logs[0], log_scale=LOG_SCALE)
+    kind = min_radius, min(max_radius, LARGEST), polarities, explained
+    return dots_in_common(pyramid.common, BLOBS, search, *kind, smaller=BLURRED)
+
+
+def small_dots(
+    log: np.ndarray,
+    min_radius: float,
+    max_radius: float,
+    polarities: Sequence[int],
+    log_scale: float,
+    explained: Sequence[np.ndarray] | np.ndarray = (),
+) -> Dots:
+    """Return the dots that stand out of an even ground all the way round, to a few tenths of a px.
+
+    The image is `log_scale` ln(I + 8), int16. The bounds are those of the semi-major axis, px. The
+    polarities are 1 to find dark dots, -1 to find bright ones. No dots are looked for inside the
+    outlines of objects that are explained already, px, each of shape (m, 2).
+    """
+    scale = 255 / (_LN_RANGE * log_scale)
+    offset = -float(np.log(8.0)) * log_scale * scale
+    eight_bit = cv2.convertScaleAbs(log, alpha=scale, beta=offset)
+    height, width = log.shape
+    size = (-(-width // _REDUCTION), -(-height // _REDUCTION))
+    reduced = cv2.resize(eight_bit, size, interpolation=cv2.INTER_AREA)
+    side = 2 * int(np.ceil(max_radius / _REDUCTION)) + 3
+    kernel = np.ones((side, side), np.uint8)
+    steps, found = np.empty_like(eight_bit), list[Dots]()
+    for polarity in polarities:
+        operation = cv2.MORPH_CLOSE if polarity > 0 else cv2.MORPH_OPEN
+        ground = cv2.morphologyEx(reduced, operation, kernel)
+        cv2.resize(ground, (width, height), steps, interpolation=cv2.INTER_LINEAR)
+        cv2.subtract(*((steps, eight_bit) if polarity > 0 else (eight_bit, steps)), steps)
+        for outline in explained:
+            cv2.fillConvexPoly(steps, np.rint(outline).astype(np.int32), 0)
+        found += _blobs_of_strips(steps, min_radius, max_radius, polarity)
+    return Dots.joined(found)
+
+
+def _blobs_of_strips(
+    height: np.ndarray, min_radius: float, max_radius: float, polarity: int
+) -> Iterator[Dots]:
+    """Yield the blobs of an image of steps, some rows at a time where it is large.
+
+    Strips overlap by the longest blob, so that each blob is whole in the strip of its centre.
+    """
+    margin = int(2 * max_radius + 3) + 2 * _REACH
+    rows = max(_STRIP // height.shape[1], 2 * margin)
+    for top in range(0, len(height), rows):
+        first = max(top - margin, 0)
+        dots = _blobs(height[first : top + rows + margin], min_radius, max_radius, polarity)
+        dots = replace(dots, frames=translated(dots.frames, 0, first)) if first else dots
+        y = dots.frames[:, 1, 2]
+        yield dots.select((y >= top - 0.5) & (y < top + rows - 0.5))
+
+
+def _blobs(height: np.ndarray, min_radius: float, max_radius: float, polarity: int) -> Dots:
+    """Return the blobs of an image of steps that have the shape of a dot."""
+    least = _MINIMUM_STEP / _LN_RANGE * 255
+    most = 2 * max_radius + 3
+    x, y, size = _connected(height, least, _LEVELS[polarity], most)
+    if not len(size):
+        return NO_DOTS
+    start = np.cumsum(size) - size
+    peak = np.maximum.reduceat(height[y, x], start)
+    x, y = x.astype(np.float64), y.astype(np.float64)
+    width = np.maximum.reduceat(x, start) - np.minimum.reduceat(x, start)
+    longest = 1 + np.maximum(width, y[start + size - 1] - y[start])  # rows ascend in a blob
+
+    def mean(values: np.ndarray) -> np.ndarray:
+        return np.add.reduceat(values, start) / size
+
+    centre_x, centre_y = mean(x), mean(y)
+    x, y = x - np.repeat(centre_x, size), y - np.repeat(centre_y, size)
+    xx, xy, yy = mean(x * x), mean(x * y), mean(y * y)
+    middle, half = (xx + yy) / 2, np.hypot((xx - yy) / 2, xy)
+    ellipse = np.pi * 4 * np.sqrt(np.maximum(xx * yy - xy * xy, 0))
+    filled = size / np.maximum(ellipse, 1e-9)
+    major = 2 * np.sqrt(np.maximum(middle + half - _BLUR, 0))
+    minor = 2 * np.sqrt(np.maximum(middle - half - _BLUR, (_MINIMUM_MINOR / 2) ** 2))
+    good = (longest >= 2 * min_radius - 2) & (longest <= most) & (peak >= least)
+    good &= (major >= min_radius) & (major <= max_radius)
+    good &= (filled < _FILLED[1]) & (filled > _FILLED[0])
+    which = best(np.flatnonzero(good), -peak[good].astype(float), MAXIMUM_BLOBS, 'small dots')
+    frames = affine_frames(centre_x, centre_y, major, minor, np.arctan2(xy, (xx - yy) / 2) / 2)
+    return Dots(frames[which], np.full(len(which), polarity), np.ones(len(which)))
+
+
+def _connected(
+    height: np.ndarray, least: float, share: float, longest: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return columns and rows of the pixels of blobs, one by one, and how many each has.
+
+    None has more pixels than a blob of a length, px; those of more length may be among them.
+    """
+    column = np.ones((int(longest) + 1 | 1, 1), np.uint8)  # odd, as OpenCV shifts others
+    none = np.zeros(0, np.int32)
+    found: list[tuple[np.ndarray, ...]] = [(none, none, none)]
+    for top, left, part, own in _parts(height, least):
+        level = cv2.dilate(part, _NEAR)
+        # In place, as new memory takes longer.
+        cv2.max(level, int(least), level)  # type: ignore[call-overload]
+        mask = part > cv2.convertScaleAbs(level, level, alpha=share)
+        if own is not None:
+            mask &= own
+        if not mask.any():
+            continue
+        # A column of more pixels is part of a blob that is longer, as is what touches it.
+        rest = mask.view(np.uint8)
+        columns = cv2.morphologyEx(
+            rest, cv2.MORPH_OPEN, column, borderType=cv2.BORDER_CONSTANT, borderValue=0
+        )
+        cv2.subtract(rest, columns, rest)
+        touching = np.flatnonzero(mask & cv2.dilate(columns, _BESIDE).view(bool))
+        # The default algorithm of OpenCV 4.5 crashes on large images with this connectivity.
+        count, labels = cv2.connectedComponentsWithAlgorithm(rest, 4, cv2.CV_32S, cv2.CCL_SAUF)
+        places = np.flatnonzero(mask)
+        label: np.ndarray = labels.ravel().take(places)
+        area = np.bincount(label, minlength=count)
+        area[labels.ravel().take(touching)] = 0
+        # A blob of more pixels is longer. How long the others are is measured on what is left.
+        usable = (area >= _MINIMUM_PIXELS) & (area <= longest**2)
+        of_usable = np.flatnonzero(usable.take(label))
+        order = of_usable[np.argsort(label[of_usable], kind='stable')]
+        y, x = np.divmod(places[order], mask.shape[1])
+        found.append((x + left, y + top, area[usable]))
+    x, y, size = (np.concatenate(column) for column in zip(*found, strict=True))
+    return x, y, size
+
+
+def _parts(
+    height: np.ndarray, least: float
+) -> Iterator[tuple[int, int, np.ndarray, np.ndarray | None]]:
+    """Yield the parts of an image that hold blobs with a pixel of a value, connected ones in one.
+
+    Each comes with its first row and column, and a mask of what in it is not in another part; the
+    image as a whole where that is not much more. A margin is as wide as `_NEAR` reaches.
+    """
+    tall, wide = (-(-side // _TILE) for side in height.shape)
+    margins = (0, tall * _TILE - height.shape[0], 0, wide * _TILE - height.shape[1])
+    padded = cv2.copyMakeBorder(height, *margins, cv2.BORDER_CONSTANT)
+    highest = padded.reshape(tall, _TILE, -1).max(axis=1).reshape(tall, wide, _TILE).max(axis=2)
+    tiles = cv2.dilate((highest >= least).astype(np.uint8), np.ones((3, 3), np.uint8))
+    count, labels, stats, _ = cv2.connectedComponentsWithStats(tiles)
+    extents = stats[1:, cv2.CC_STAT_WIDTH] * stats[1:, cv2.CC_STAT_HEIGHT]
+    if extents.sum() > _MAXIMUM_TILES * tiles.size:
+        yield 0, 0, height, None
+        return
+    for number in range(1, count):
+        column, row, columns, rows, _ = stats[number].tolist()
+        own = labels[row : row + rows, column : column + columns] == number
+        own = np.kron(own, np.ones((_TILE, _TILE), bool))
+        own = np.pad(own, _REACH)
+        top, left = row * _TILE - _REACH, column * _TILE - _REACH
+        bottom, right = top + own.shape[0], left + own.shape[1]
+        own = own[max(-top, 0) :, max(-left, 0) :]
+        top, left = max(top, 0), max(left, 0)
+        part = height[top:bottom, left:right]
+        yield top, left, part, own[: part.shape[0], : part.shape[1]]
