@@ -19,15 +19,15 @@ from ahf_ros.bag.output import answer_topic, begun_with
 from ahf_ros.bag.source import Source
 from ahf_ros.base import ending
 from ahf_ros.base.text import counted, listed
-from ahf_ros.cloud_settings import CloudSettings
+from ahf_ros.clouds.cloud_settings import CloudSettings
+from ahf_ros.clouds.localisation import labelled
+from ahf_ros.clouds.matching import ANSWER, ANSWERS, CLOUD, WAITING_MEMORY, Matcher
+from ahf_ros.clouds.point_clouds import organised_points
+from ahf_ros.clouds.registration_files import write_registration
+from ahf_ros.clouds.registration_settings import RegistrationSettings
+from ahf_ros.clouds.scans import Scans, known_targets, located, scan_cloud
 from ahf_ros.interchange.image_messages import nanoseconds
-from ahf_ros.interchange.matching import ANSWER, ANSWERS, CLOUD, WAITING_MEMORY, Matcher
-from ahf_ros.interchange.point_clouds import organised_points
-from ahf_ros.interchange.registration_files import write_registration
 from ahf_ros.interchange.target_messages import is_answered
-from ahf_ros.localisation import labelled
-from ahf_ros.registration_settings import RegistrationSettings
-from ahf_ros.scans import Scans, known_targets, located, scan_cloud
 
 POINT_CLOUD = 'sensor_msgs/msg/PointCloud2'
 

@@ -31,9 +31,9 @@ from ahf_ros.cli.options import (
     output_path,
     settings_from,
 )
-from ahf_ros.cloud_settings import CloudSettings
+from ahf_ros.clouds.cloud_settings import CloudSettings
+from ahf_ros.clouds.registration_settings import RegistrationSettings
 from ahf_ros.detectors import is_foreign
-from ahf_ros.registration_settings import RegistrationSettings
 from ahf_ros.session_settings import IdentificationSettings, StackSettings
 
 if TYPE_CHECKING:

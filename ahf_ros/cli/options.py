@@ -12,11 +12,11 @@ from typing import Any, TypeVar
 from ahf_ros.base.inputs import register_input
 from ahf_ros.base.settings.nested import assemble, flat_parameters
 from ahf_ros.base.settings.parameter import Parameter, parameters
-from ahf_ros.cloud_settings import CloudSettings
+from ahf_ros.clouds.cloud_settings import CloudSettings
+from ahf_ros.clouds.registration_settings import RegistrationSettings
 from ahf_ros.detectors.contract import DetectorSettings
 from ahf_ros.filtering.settings import AdaptiveSettings
 from ahf_ros.prints.families import files_by_name
-from ahf_ros.registration_settings import RegistrationSettings
 from ahf_ros.session_settings import IdentificationSettings
 
 Settings = TypeVar('Settings')

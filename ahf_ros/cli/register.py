@@ -21,8 +21,8 @@ from ahf_ros.cli.options import (
     output_path,
     settings_from,
 )
-from ahf_ros.cloud_settings import CloudSettings
-from ahf_ros.registration_settings import RegistrationSettings
+from ahf_ros.clouds.cloud_settings import CloudSettings
+from ahf_ros.clouds.registration_settings import RegistrationSettings
 from ahf_ros.session_settings import IdentificationSettings
 
 if TYPE_CHECKING:
@@ -65,9 +65,9 @@ def run(options: argparse.Namespace) -> int:
         raise ValueError('output is the folder of the scans, accepted is another one')
     pairs = list(_pairs(options.folder))
 
+    from ahf_ros.clouds.registration_files import write_registration
+    from ahf_ros.clouds.scans import Scans, known_targets
     from ahf_ros.interchange.cloud_files import read_cloud
-    from ahf_ros.interchange.registration_files import write_registration
-    from ahf_ros.scans import Scans, known_targets
     from ahf_ros.session import create_identifier
 
     identifier = create_identifier(settings=settings)
@@ -125,10 +125,10 @@ def _target_points(
     cloud_file: Path, image_file: Path, identifier: Identifier, settings: CloudSettings
 ) -> np.ndarray:
     """Return the targets of a scan with their positions, as the node detector publishes them."""
+    from ahf_ros.clouds.localisation import labelled
+    from ahf_ros.clouds.scans import located
     from ahf_ros.interchange.cloud_files import read_cloud
     from ahf_ros.interchange.image_files import read_image
-    from ahf_ros.localisation import labelled
-    from ahf_ros.scans import located
 
     cloud, image = read_cloud(cloud_file), read_image(image_file)
     targets = identifier.identify(image).targets

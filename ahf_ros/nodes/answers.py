@@ -13,8 +13,8 @@ from sensor_msgs.msg import Image
 from std_msgs.msg import Header
 from visualization_msgs.msg import ImageMarker
 
+from ahf_ros.clouds.matching import Waiting
 from ahf_ros.drawing.overlay import draw
-from ahf_ros.interchange.matching import Waiting
 from ahf_ros.msg import CodedTargetArray
 from ahf_ros.nodes.cloud import TargetPoints
 from ahf_ros.nodes.diagnostics import CloudTally, Tally

@@ -10,11 +10,12 @@ from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import Header
 from visualization_msgs.msg import MarkerArray
 
-from ahf_ros.cloud_settings import CloudSettings
+from ahf_ros.clouds.cloud_settings import CloudSettings
+from ahf_ros.clouds.localisation import Positions
+from ahf_ros.clouds.matching import ANSWER, ANSWERS, CLOUD, Matcher, Waiting
+from ahf_ros.clouds.point_clouds import organised_points
+from ahf_ros.clouds.scans import located
 from ahf_ros.interchange.image_messages import nanoseconds
-from ahf_ros.interchange.matching import ANSWER, ANSWERS, CLOUD, Matcher, Waiting
-from ahf_ros.interchange.point_clouds import organised_points
-from ahf_ros.localisation import Positions
 from ahf_ros.msg import CodedTargetArray
 from ahf_ros.nodes.diagnostics import CloudTally
 from ahf_ros.nodes.inputs import Input
@@ -22,7 +23,6 @@ from ahf_ros.nodes.messages import target_labels, target_points
 from ahf_ros.nodes.process import LOG_PERIOD, ProcessNode
 from ahf_ros.nodes.settings import LOSSLESS, DetectorNodeSettings
 from ahf_ros.nodes.topics import ANSWERS_KEPT, POINTS, TARGET_LABELS, TARGET_POINTS
-from ahf_ros.scans import located
 
 _relevant = attrgetter('cloud', 'queue', 'queue_memory')
 

@@ -21,7 +21,7 @@ from std_srvs.srv import Trigger
 
 from ahf_ros.base import ending
 from ahf_ros.base.text import printable
-from ahf_ros.interchange.point_clouds import organised_points
+from ahf_ros.clouds.point_clouds import organised_points
 from ahf_ros.nodes.answers import Answers
 from ahf_ros.nodes.cloud import points_of
 from ahf_ros.nodes.diagnostics import PERIOD, Diagnostics, Tally, publish_status

@@ -31,15 +31,15 @@ from std_msgs.msg import ColorRGBA, Header
 from visualization_msgs.msg import ImageMarker, Marker, MarkerArray
 
 from ahf_ros.base.target import UNDECODED
+from ahf_ros.clouds.localisation import Positions, labelled
+from ahf_ros.clouds.point_clouds import COVARIANCE, NUMBERS
+from ahf_ros.clouds.registration.field import Field, RegisteredScan
 from ahf_ros.drawing.overlay import DECODED_COLOUR, DOUBTFUL_COLOUR, Colour
 from ahf_ros.interchange.cloud_files import AXES
-from ahf_ros.interchange.point_clouds import COVARIANCE, NUMBERS
 from ahf_ros.interchange.target_messages import has_corners
-from ahf_ros.localisation import Positions, labelled
 from ahf_ros.msg import CodedTarget, CodedTargetArray
 from ahf_ros.orientation.transform import Transform
 from ahf_ros.prints.square import library_name
-from ahf_ros.registration.field import Field, RegisteredScan
 
 _DATATYPES = {kind: number for number, kind in NUMBERS.items()}
 _PLACE = [(name, '<f4') for name in AXES] + [('id', '<i4')]

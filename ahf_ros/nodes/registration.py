@@ -18,10 +18,11 @@ from std_msgs.msg import Header
 from std_srvs.srv import Trigger
 
 from ahf_ros.base.text import counted, printable
+from ahf_ros.clouds.matching import ANSWER, ANSWERS, CLOUD, WAITING_MEMORY, Matcher
+from ahf_ros.clouds.point_clouds import whole_points
+from ahf_ros.clouds.registration_files import ScanRecord, in_common_frame, write_registration
+from ahf_ros.clouds.scans import Scans, known_targets, scan_cloud
 from ahf_ros.interchange.image_messages import nanoseconds
-from ahf_ros.interchange.matching import ANSWER, ANSWERS, CLOUD, WAITING_MEMORY, Matcher
-from ahf_ros.interchange.point_clouds import whole_points
-from ahf_ros.interchange.registration_files import ScanRecord, in_common_frame, write_registration
 from ahf_ros.nodes.diagnostics import publish_status, status_of
 from ahf_ros.nodes.inputs import Input
 from ahf_ros.nodes.messages import (
@@ -38,7 +39,6 @@ from ahf_ros.nodes.settings import RegistrationNodeSettings
 from ahf_ros.nodes.tf import PACKAGE, Frames
 from ahf_ros.nodes.topics import ANSWERS_KEPT, POINTS
 from ahf_ros.nodes.watch import Expected, Silence
-from ahf_ros.scans import Scans, known_targets, scan_cloud
 
 _NO_TF = (
     f'tf is True and the package {PACKAGE} is not there: no tf; ros-DISTRIBUTION-tf2-msgs '

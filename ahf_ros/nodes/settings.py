@@ -10,11 +10,11 @@ from importlib.util import find_spec
 from ahf_ros.base.extras import missing
 from ahf_ros.base.settings.parameter import check_parameters, parameter
 from ahf_ros.base.text import printable, shown
-from ahf_ros.cloud_settings import MAXIMUM_TOLERANCE, CloudSettings
+from ahf_ros.clouds.cloud_settings import MAXIMUM_TOLERANCE, CloudSettings
+from ahf_ros.clouds.registration_settings import RegistrationSettings, check_frame, unit_parameter
 from ahf_ros.detectors import DETECTOR, detector_name
 from ahf_ros.nodes.patience import CONTINUOUS, TRIGGERED, UNKNOWN
 from ahf_ros.prints.families import prints_of
-from ahf_ros.registration_settings import RegistrationSettings, check_frame, unit_parameter
 from ahf_ros.session import create_identifier
 from ahf_ros.session_settings import IdentificationSettings, StackSettings
 from ahf_ros.synthetic.scene import SceneSettings

@@ -12,8 +12,8 @@ from functools import partial
 from rclpy.qos import QoSCompatibility, QoSProfile, ReliabilityPolicy, qos_check_compatible
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
-from ahf_ros.cloud_settings import MAXIMUM_TOLERANCE
-from ahf_ros.interchange.matching import ANSWER, CLOUD, Waiting
+from ahf_ros.clouds.cloud_settings import MAXIMUM_TOLERANCE
+from ahf_ros.clouds.matching import ANSWER, CLOUD, Waiting
 from ahf_ros.nodes.diagnostics import Tally
 from ahf_ros.nodes.inputs import Input
 from ahf_ros.nodes.patience import TRIGGERED, UNKNOWN, Patience

@@ -23,7 +23,7 @@ from sensor_msgs.msg import Image, PointCloud2, PointField
 from std_msgs.msg import Header
 from test_nodes_rig import in_space, read, scan, synthetic_camera
 
-from ahf_ros.interchange.point_clouds import organised_points
+from ahf_ros.clouds.point_clouds import organised_points
 from ahf_ros.nodes.drivers import DRIVERS, Driver
 from ahf_ros.synthetic.scene import Rendering, SceneSettings, render
 from support.launch_files import launched

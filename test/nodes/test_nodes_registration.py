@@ -19,18 +19,18 @@ from std_msgs.msg import Header
 from std_srvs.srv import Trigger
 from test_nodes import header
 
-from ahf_ros.interchange.cloud_files import read_cloud
-from ahf_ros.interchange.coordinate_files import read_coordinates
-from ahf_ros.interchange.point_clouds import (
+from ahf_ros.clouds.point_clouds import (
     COVARIANCE,
     TARGET_POINT,
     target_scan,
     whole_points,
 )
+from ahf_ros.clouds.registration.scan import Scan
+from ahf_ros.interchange.cloud_files import read_cloud
+from ahf_ros.interchange.coordinate_files import read_coordinates
 from ahf_ros.nodes.messages import cloud_message
 from ahf_ros.orientation.camera import rotation_matrices
 from ahf_ros.orientation.transform import Transform, rotation_vector
-from ahf_ros.registration.scan import Scan
 from support.detector import overrides, own, values
 from support.scans import measured, ring, squared_error, station
 

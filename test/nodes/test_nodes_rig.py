@@ -17,7 +17,7 @@ from std_msgs.msg import Header
 from test_nodes import header
 from visualization_msgs.msg import ImageMarker, Marker, MarkerArray
 
-from ahf_ros.interchange.point_clouds import COVARIANCE
+from ahf_ros.clouds.point_clouds import COVARIANCE
 from ahf_ros.msg import CodedTargetArray
 from ahf_ros.nodes.messages import image_message
 from ahf_ros.srv import Identify

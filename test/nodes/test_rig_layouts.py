@@ -16,10 +16,10 @@ from std_msgs.msg import Header
 from test_foxglove_layout import leaves
 from test_nodes_registration import organised, scan, target_points
 
+from ahf_ros.clouds.registration.session import Registration
 from ahf_ros.nodes.interfaces import NODES
 from ahf_ros.nodes.messages import field_points, residual_points
 from ahf_ros.nodes.settings import RegistrationNodeSettings
-from ahf_ros.registration.session import Registration
 from support import ROOT
 
 RVIZ = yaml.safe_load((ROOT / 'config' / 'rig.rviz').read_text())['Visualization Manager']

@@ -20,7 +20,7 @@ from sensor_msgs.msg import PointCloud2
 from std_srvs.srv import Trigger
 from test_nodes_registration import transform_of
 
-from ahf_ros.interchange.point_clouds import whole_points
+from ahf_ros.clouds.point_clouds import whole_points
 from support import ROOT, bags
 from support.launch_files import launched
 from support.live import Graph

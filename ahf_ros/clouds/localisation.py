@@ -32,9 +32,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ahf_ros.base.target import Target
-from ahf_ros.cloud_settings import FULL, NEIGHBOURHOOD, CloudGrid
+from ahf_ros.clouds.cloud_settings import FULL, NEIGHBOURHOOD, CloudGrid
+from ahf_ros.clouds.point_clouds import COVARIANCE, TARGET_POINT
 from ahf_ros.interchange.cloud_files import AXES
-from ahf_ros.interchange.point_clouds import COVARIANCE, TARGET_POINT
 from ahf_ros.vision.robust import NORMAL
 
 MINIMUM_POINTS = 12
@@ -91,7 +91,7 @@ def positions(
     """Return the positions of targets, `Target` or ahf_ros/CodedTarget, px of the image.
 
     The cloud, of shape (height, width) with the fields x, y and z, is one that
-    `ahf_ros.interchange.point_clouds.organised_points` returns. Points that are not finite in
+    `ahf_ros.clouds.point_clouds.organised_points` returns. Points that are not finite in
     float32 or that are 0, 0, 0 are missing. Those within `neighbourhood` radii of the dot, an
     ellipse, from its centre count. A target has no position if fewer than `MINIMUM_POINTS`, or
     less than a fifth, of the pixels around it have points on its plane, or if all of these are on

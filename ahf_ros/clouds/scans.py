@@ -9,15 +9,15 @@ import numpy as np
 
 from ahf_ros.base.blas import one_blas_thread
 from ahf_ros.base.target import Target
-from ahf_ros.cloud_settings import CloudSettings
+from ahf_ros.clouds.cloud_settings import CloudSettings
+from ahf_ros.clouds.localisation import Positions, positions
+from ahf_ros.clouds.point_clouds import organised_points, target_scan, whole_points
+from ahf_ros.clouds.registration.field import RegisteredScan
+from ahf_ros.clouds.registration.session import Registration
+from ahf_ros.clouds.registration_files import ScanRecord
+from ahf_ros.clouds.registration_settings import RegistrationSettings
 from ahf_ros.interchange.coordinate_files import read_coordinates
-from ahf_ros.interchange.point_clouds import organised_points, target_scan, whole_points
-from ahf_ros.interchange.registration_files import ScanRecord
-from ahf_ros.localisation import Positions, positions
 from ahf_ros.orientation.points import MeasuredPoints
-from ahf_ros.registration.field import RegisteredScan
-from ahf_ros.registration.session import Registration
-from ahf_ros.registration_settings import RegistrationSettings
 
 
 def located(
@@ -25,8 +25,8 @@ def located(
 ) -> Positions:
     """Return the positions of the targets of an image with so many rows and columns.
 
-    A ValueError says why the cloud, one of `ahf_ros.localisation.positions`, does not fit. The
-    number of threads of BLAS changes no bit of the positions.
+    A ValueError says why the cloud, one of `ahf_ros.clouds.localisation.positions`, does not fit.
+    The number of threads of BLAS changes no bit of the positions.
     """
     rows, columns = cloud.shape
     settings.grid.check((rows, columns), image)

@@ -12,9 +12,9 @@ import numpy as np
 
 from ahf_ros.base.target import UNDECODED
 from ahf_ros.base.text import shown
+from ahf_ros.clouds.registration.scan import Scan
 from ahf_ros.interchange.cloud_files import AXES
 from ahf_ros.interchange.image_messages import check_rows
-from ahf_ros.registration.scan import Scan
 
 COVARIANCE = ('xx', 'xy', 'xz', 'yy', 'yz', 'zz')
 """Fields of target points with the covariance of x, y and z."""
@@ -26,7 +26,7 @@ TARGET_POINT = np.dtype(
         *((name, '<f4') for name in ('confidence', 'deviation', *COVARIANCE)),
     ]
 )
-"""A point of ~/target_points; the deviation is that of `ahf_ros.localisation.Positions`."""
+"""A point of ~/target_points; the deviation is that of `ahf_ros.clouds.localisation.Positions`."""
 
 FLOAT32, FLOAT64 = 7, 8
 """Accepted types of these fields, as numbered in sensor_msgs/PointField."""

@@ -8,8 +8,8 @@ import numpy.lib.recfunctions as rfn
 import pytest
 
 from ahf_ros.base.target import Target
-from ahf_ros.cloud_settings import CloudGrid
-from ahf_ros.localisation import Positions, positions
+from ahf_ros.clouds.cloud_settings import CloudGrid
+from ahf_ros.clouds.localisation import Positions, positions
 
 KIND = np.dtype([('x', '<f4'), ('y', '<f4'), ('z', '<f4')])
 EXACT = np.dtype([('x', '<f8'), ('y', '<f8'), ('z', '<f8')])

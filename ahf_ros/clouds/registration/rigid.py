@@ -16,10 +16,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ahf_ros.clouds.registration.scan import block_diagonal
 from ahf_ros.orientation.network import FloatArray
 from ahf_ros.orientation.similarity import similarity_between
 from ahf_ros.orientation.transform import Transform
-from ahf_ros.registration.scan import block_diagonal
 
 _ROUNDS = 50
 _CONVERGED = 1e-12  # decrease of the sum of weighted squares that a step promises, relative

@@ -1,7 +1,7 @@
 from __future__ import annotations
 
-from ahf_ros.cloud_settings import CloudSettings
-from ahf_ros.interchange.matching import Matcher
+from ahf_ros.clouds.cloud_settings import CloudSettings
+from ahf_ros.clouds.matching import Matcher
 
 CLOUD, ANSWER = 0, 1
 

@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ahf_ros.base.text import counted, listed
+from ahf_ros.clouds.registration.rigid import Fit, fit
 from ahf_ros.orientation.network import FloatArray
 from ahf_ros.orientation.points import entries
 from ahf_ros.orientation.similarity import similarity_between
-from ahf_ros.registration.rigid import Fit, fit
 
 NARROW = 0.03
 """Smallest accepted width of a field of targets across its length, relative to this."""

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from ahf_ros.interchange.point_clouds import FLOAT32, FLOAT64, organised_points
+from ahf_ros.clouds.point_clouds import FLOAT32, FLOAT64, organised_points
 
 INT32 = 5
 XYZ = np.arange(36, dtype=float).reshape(3, 4, 3)

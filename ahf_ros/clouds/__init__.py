@@ -1,0 +1,1 @@
+"""Point clouds: positions of targets in them, and scans in one frame."""
