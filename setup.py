@@ -14,7 +14,8 @@ setup(
         '': ['*.json', 'py.typed'],
         'ahf_ros.prints': ['ring_families/*'],
         'ahf_ros.interchange': ['html/*'],
-        'ahf_ros.report': ['network_html/*', 'page/*'],
+        'ahf_ros.network.report': ['html/*'],
+        'ahf_ros.report': ['page/*'],
     },
     # With this an editable installation is one path to the sources, new modules included.
     package_dir={'': '.'},

@@ -26,16 +26,16 @@ _MODULES = {
     'Target': 'base.target',
     'TrueTarget': 'base.target',
     'UndecodedTarget': 'base.target',
-    'adjust': 'orientation.adjustment',
-    'compare': 'orientation.congruence',
+    'adjust': 'network.adjustment',
+    'compare': 'network.congruence',
     'create_detector': 'detectors',
     'create_identifier': 'session',
     'draw': 'drawing.overlay',
     'identify': 'session',
-    'orient': 'orientation.orient',
+    'orient': 'network.orient',
     'read_image': 'interchange.image_files',
     'render': 'synthetic.scene',
-    'resect': 'orientation.single_image',
+    'resect': 'network.single_image',
     'score': 'evaluation',
     'write_image': 'interchange.image_files',
 }
@@ -61,10 +61,10 @@ if TYPE_CHECKING:  # which takes what is imported `as` itself for public
     from ahf_ros.filtering.settings import AdaptiveSettings as AdaptiveSettings
     from ahf_ros.interchange.image_files import read_image as read_image
     from ahf_ros.interchange.image_files import write_image as write_image
-    from ahf_ros.orientation.adjustment import adjust as adjust
-    from ahf_ros.orientation.congruence import compare as compare
-    from ahf_ros.orientation.orient import orient as orient
-    from ahf_ros.orientation.single_image import resect as resect
+    from ahf_ros.network.adjustment import adjust as adjust
+    from ahf_ros.network.congruence import compare as compare
+    from ahf_ros.network.orient import orient as orient
+    from ahf_ros.network.single_image import resect as resect
     from ahf_ros.session import create_identifier as create_identifier
     from ahf_ros.session import identify as identify
     from ahf_ros.session_settings import IdentificationSettings as IdentificationSettings

@@ -14,8 +14,8 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from ahf_ros.orientation.adjustment import adjust
-from ahf_ros.orientation.orient import orient
+from ahf_ros.network.adjustment import adjust
+from ahf_ros.network.orient import orient
 from benchmarks import network_epochs, network_errors, network_starts
 from benchmarks.report import print_chosen
 from benchmarks.report import table as markdown

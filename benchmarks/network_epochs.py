@@ -33,10 +33,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ahf_ros.orientation.congruence import LEVEL, compare
-from ahf_ros.orientation.datum import movements
-from ahf_ros.orientation.network import FloatArray, IntArray
-from ahf_ros.orientation.points import blocks
+from ahf_ros.network.congruence import LEVEL, compare
+from ahf_ros.network.datum import movements
+from ahf_ros.network.network import FloatArray, IntArray
+from ahf_ros.network.points import blocks
 from benchmarks.report import number, progress
 from benchmarks.report import table as markdown
 from support.simulated_epochs import FIELDS, Adjusted, Epoch, Field, differences, points_of

@@ -18,17 +18,17 @@ from typing import Any
 
 import numpy as np
 
-from ahf_ros.orientation.adjustment import adjust
-from ahf_ros.orientation.camera import PARAMETERS, project
-from ahf_ros.orientation.congruence import compare
-from ahf_ros.orientation.knowledge import Known
-from ahf_ros.orientation.measurement import distances
-from ahf_ros.orientation.network import ControlPoint, Network, ScaleBar
-from ahf_ros.orientation.points import MeasuredPoints, entries
-from ahf_ros.orientation.refinement import refine
-from ahf_ros.orientation.similarity import similarity_between
-from ahf_ros.orientation.solution import Solution, Start
-from ahf_ros.orientation.suspects import Misclosures
+from ahf_ros.network.adjustment import adjust
+from ahf_ros.network.camera import PARAMETERS, project
+from ahf_ros.network.congruence import compare
+from ahf_ros.network.knowledge import Known
+from ahf_ros.network.measurement import distances
+from ahf_ros.network.network import ControlPoint, Network, ScaleBar
+from ahf_ros.network.points import MeasuredPoints, entries
+from ahf_ros.network.refinement import refine
+from ahf_ros.network.similarity import similarity_between
+from ahf_ros.network.solution import Solution, Start
+from ahf_ros.network.suspects import Misclosures
 from benchmarks.report import number, progress
 from benchmarks.report import table as markdown
 from support.network_scenes import HEIGHT, LENS, WIDTH, Field, approximate, simulate

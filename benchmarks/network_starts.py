@@ -20,15 +20,15 @@ from typing import Any
 import numpy as np
 
 from ahf_ros import identify, read_image
-from ahf_ros.orientation.network import (
+from ahf_ros.network.network import (
     CameraView,
     IntArray,
     Network,
     Observations,
 )
-from ahf_ros.orientation.orient import orient
-from ahf_ros.orientation.resection import FEWEST_POINTS
-from ahf_ros.orientation.solution import Solution
+from ahf_ros.network.orient import orient
+from ahf_ros.network.resection import FEWEST_POINTS
+from ahf_ros.network.solution import Solution
 from benchmarks.report import number, table
 from support.random_networks import Rendered, deviations, rendered
 

@@ -18,10 +18,10 @@ import numpy as np
 
 from ahf_ros.clouds.registration.scan import Scan
 from ahf_ros.clouds.registration.session import Registration
-from ahf_ros.orientation.network import FloatArray
-from ahf_ros.orientation.pose import Pose
-from ahf_ros.orientation.single_image import resect
-from ahf_ros.orientation.transform import Transform
+from ahf_ros.network.network import FloatArray
+from ahf_ros.network.pose import Pose
+from ahf_ros.network.single_image import resect
+from ahf_ros.network.transform import Transform
 from benchmarks.report import print_chosen
 from support.poses import CAMERA, View, normalised_square, view, with_wrong_id
 from support.scans import clouds, drawn, ring, squared_error, station

@@ -13,11 +13,11 @@ from pathlib import Path
 
 import numpy as np
 
-from ahf_ros.orientation.adjustment import adjust
-from ahf_ros.orientation.camera import PARAMETERS, pinhole, undistort
-from ahf_ros.orientation.network import CameraView, ControlPoint, Network, Observations
-from ahf_ros.orientation.refinement import refine
-from ahf_ros.orientation.solution import Solution, Start
+from ahf_ros.network.adjustment import adjust
+from ahf_ros.network.camera import PARAMETERS, pinhole, undistort
+from ahf_ros.network.network import CameraView, ControlPoint, Network, Observations
+from ahf_ros.network.refinement import refine
+from ahf_ros.network.solution import Solution, Start
 
 WIDTH, HEIGHT = 2272, 1704
 PIXEL = 5.43764 / HEIGHT  # mm, its height

@@ -7,11 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from ahf_ros.orientation.adjustment import adjust
-from ahf_ros.orientation.camera import project
-from ahf_ros.orientation.network import ScaleBar
-from ahf_ros.orientation.points import MeasuredPoints
-from ahf_ros.orientation.solution import Solution
+from ahf_ros.network.adjustment import adjust
+from ahf_ros.network.camera import project
+from ahf_ros.network.network import ScaleBar
+from ahf_ros.network.points import MeasuredPoints
+from ahf_ros.network.solution import Solution
 from support.networks import CALIBRATION, solution
 
 NOISE = 0.02

@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ahf_ros.orientation.camera import pinhole, project, rotation_matrices
-from ahf_ros.orientation.network import CameraView, Network, Observations
-from ahf_ros.orientation.solution import Start
+from ahf_ros.network.camera import pinhole, project, rotation_matrices
+from ahf_ros.network.network import CameraView, Network, Observations
+from ahf_ros.network.solution import Start
 
 WIDTH, HEIGHT = 4000, 3000
 

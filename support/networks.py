@@ -9,8 +9,8 @@ import numpy as np
 
 from ahf_ros.base.target import Identification, Target
 from ahf_ros.interchange.target_json import to_json
-from ahf_ros.orientation.camera import pinhole, project
-from ahf_ros.orientation.network import (
+from ahf_ros.network.camera import pinhole, project
+from ahf_ros.network.network import (
     CameraView,
     ControlPoint,
     FloatArray,
@@ -18,7 +18,7 @@ from ahf_ros.orientation.network import (
     Observations,
     ScaleBar,
 )
-from ahf_ros.orientation.solution import Solution, Start
+from ahf_ros.network.solution import Solution, Start
 
 SIZE = 1600, 1200
 CALIBRATION = np.array([1500.0, 803.0, 596.0, -0.08, 0.02, 0.001, 2e-4, -1e-4, 1e-4, 2e-5])

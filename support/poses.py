@@ -7,10 +7,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ahf_ros.base.target import Target
-from ahf_ros.orientation.camera import project, rotation_matrices
-from ahf_ros.orientation.network import FloatArray
-from ahf_ros.orientation.points import MeasuredPoints
-from ahf_ros.orientation.transform import Transform
+from ahf_ros.network.camera import project, rotation_matrices
+from ahf_ros.network.network import FloatArray
+from ahf_ros.network.points import MeasuredPoints
+from ahf_ros.network.transform import Transform
 
 SIZE = 2464, 2056
 CAMERA = np.array([2400.0, 1240.0, 1020.0, -0.1, 0.08, -0.02, 3e-4, -2e-4, 0.0, 0.0])

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ahf_ros.orientation.camera import pinhole, project
-from ahf_ros.orientation.network import (
+from ahf_ros.network.camera import pinhole, project
+from ahf_ros.network.network import (
     CameraView,
     FloatArray,
     IntArray,

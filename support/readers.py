@@ -19,20 +19,20 @@ import numpy as np
 from ahf_ros.base.extras import missing
 from ahf_ros.cli.identify import image_paths
 from ahf_ros.interchange.arrays import read_arrays
-from ahf_ros.interchange.camera_files import read_camera
 from ahf_ros.interchange.cloud_files import read_cloud, write_pcd, write_ply
-from ahf_ros.interchange.control_files import read_control, read_lengths, read_scale_bars
-from ahf_ros.interchange.coordinate_files import read_coordinates
 from ahf_ros.interchange.exif import read_exif
-from ahf_ros.interchange.export.survey import read_measured_images
 from ahf_ros.interchange.image_files import read_noted_image
-from ahf_ros.interchange.network_files import read_cameras
-from ahf_ros.interchange.network_results import read_network, write_network
-from ahf_ros.interchange.observation_files import read_observations
-from ahf_ros.interchange.robot_files import read_robot_poses, read_stations
 from ahf_ros.interchange.tables import POINT, read_by_image, read_points, read_table
 from ahf_ros.interchange.target_json import read_results
 from ahf_ros.interchange.truth_files import read_truth
+from ahf_ros.network.export.survey import read_measured_images
+from ahf_ros.network.files.camera_files import read_camera
+from ahf_ros.network.files.control_files import read_control, read_lengths, read_scale_bars
+from ahf_ros.network.files.coordinate_files import read_coordinates
+from ahf_ros.network.files.network_files import read_cameras
+from ahf_ros.network.files.network_results import read_network, write_network
+from ahf_ros.network.files.observation_files import read_observations
+from ahf_ros.network.files.robot_files import read_robot_poses, read_stations
 from ahf_ros.prints import RING_FOLDER
 from ahf_ros.prints.data_file import read_data_file
 from ahf_ros.prints.dots import DOTS_DESIGN, dot_family

@@ -10,9 +10,9 @@ from ahf_ros.base.target import Target
 from ahf_ros.clouds.localisation import positions
 from ahf_ros.clouds.registration.scan import Scan
 from ahf_ros.interchange.cloud_files import AXES
-from ahf_ros.orientation.camera import rotation_matrices
-from ahf_ros.orientation.network import FloatArray
-from ahf_ros.orientation.transform import Transform
+from ahf_ros.network.camera import rotation_matrices
+from ahf_ros.network.network import FloatArray
+from ahf_ros.network.transform import Transform
 
 RADIUS = 0.5
 """Radius of the object, m."""

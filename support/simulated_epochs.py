@@ -10,19 +10,19 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ahf_ros.orientation.adjustment import adjust
-from ahf_ros.orientation.camera import (
+from ahf_ros.network.adjustment import adjust
+from ahf_ros.network.camera import (
     PARAMETERS,
     linearise,
     pinhole,
     project,
     rotation_matrices,
 )
-from ahf_ros.orientation.datum import movements, s_transform
-from ahf_ros.orientation.network import FloatArray, ScaleBar
-from ahf_ros.orientation.points import MeasuredPoints
-from ahf_ros.orientation.similarity import Similarity
-from ahf_ros.orientation.solution import Solution
+from ahf_ros.network.datum import movements, s_transform
+from ahf_ros.network.network import FloatArray, ScaleBar
+from ahf_ros.network.points import MeasuredPoints
+from ahf_ros.network.similarity import Similarity
+from ahf_ros.network.solution import Solution
 from support.network_scenes import Field as Scene
 from support.network_scenes import simulate
 

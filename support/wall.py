@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from ahf_ros.orientation.camera import rotation_matrices
+from ahf_ros.network.camera import rotation_matrices
 from ahf_ros.synthetic.camera import tilted_camera
 from ahf_ros.synthetic.scene import SceneSettings
 

@@ -13,10 +13,10 @@ from ahf_ros.base.settings.parameter import Parameter
 from ahf_ros.cli import say, tell
 from ahf_ros.cli.options import add_option, add_quiet, input_path, output_path, parsed_by
 from ahf_ros.cli.tables import identifiers, print_table
-from ahf_ros.orientation.units import decimals
+from ahf_ros.network.units import decimals
 
 if TYPE_CHECKING:
-    from ahf_ros.orientation.congruence import Comparison
+    from ahf_ros.network.congruence import Comparison
 
 _FORMATS = '.csv', '.svg'
 
@@ -65,8 +65,8 @@ def run(options: argparse.Namespace) -> int:
     """Compare the epochs, show what moved, and write files."""
     from ahf_ros.base.writing import write_whole
     from ahf_ros.interchange.files import csv_table
-    from ahf_ros.interchange.network_results import read_network
-    from ahf_ros.orientation.congruence import compare
+    from ahf_ros.network.congruence import compare
+    from ahf_ros.network.files.network_results import read_network
 
     try:
         epochs = [read_network(path).points for path in (options.first, options.second)]
@@ -80,7 +80,7 @@ def run(options: argparse.Namespace) -> int:
             if path.suffix.lower() == '.csv':
                 write_whole(path, csv_table(_rows(found)))
             else:
-                from ahf_ros.drawing.movements import movements_figure
+                from ahf_ros.network.report.movements import movements_figure
 
                 write_whole(path, movements_figure(found).encode())
     except ValueError as error:

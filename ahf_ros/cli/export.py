@@ -13,10 +13,10 @@ from ahf_ros.base.settings.parameter import Parameter
 from ahf_ros.base.text import counted
 from ahf_ros.cli import say, tell
 from ahf_ros.cli.options import Group, add_option, input_name, parsed_by
-from ahf_ros.interchange.export.formats import FORMATS, Export
+from ahf_ros.network.export.formats import FORMATS, Export
 
 if TYPE_CHECKING:
-    from ahf_ros.interchange.export.survey import Control, MeasuredImage
+    from ahf_ros.network.export.survey import Control, MeasuredImage
 
 _FOLDER = f'to a folder as other software reads them: {", ".join(FORMATS)}.'
 
@@ -70,7 +70,7 @@ def _add_control_arguments(parser: Group) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Write each export."""
-    from ahf_ros.interchange.export.survey import read_measured_images
+    from ahf_ros.network.export.survey import read_measured_images
 
     check_control(options)
     try:
@@ -99,8 +99,8 @@ def control_from(options: argparse.Namespace) -> Control | None:
     """
     if options.control is None:
         return None
-    from ahf_ros.interchange.export.survey import Control
     from ahf_ros.interchange.tables import read_points
+    from ahf_ros.network.export.survey import Control
 
     points = read_points(options.control)
     return Control(points, options.control_crs.strip(), options.control_sigma)
@@ -117,7 +117,7 @@ def write_exports(
 
     They are reported on standard error; with `quiet`, only problems are.
     """
-    from ahf_ros.interchange.export.survey import make_survey, notes_on
+    from ahf_ros.network.export.survey import make_survey, notes_on
 
     written = True
     for export in exports:

@@ -46,7 +46,7 @@ from ahf_ros.session_settings import IdentificationSettings, StackSettings
 if TYPE_CHECKING:
     import numpy as np
 
-    from ahf_ros.interchange.export.survey import MeasuredImage
+    from ahf_ros.network.export.survey import MeasuredImage
 
 _WORTH_PROCESSES = 4  # images; fewer are identified before processes have started
 
@@ -123,7 +123,7 @@ def _run(options: argparse.Namespace, output: TextIO | None) -> int:
     from ahf_ros.batch.results import Unwritable
     from ahf_ros.batch.settling import settled_tasks
     from ahf_ros.detectors import is_foreign
-    from ahf_ros.interchange.export.survey import measured_image
+    from ahf_ros.network.export.survey import measured_image
 
     failed = bool(problems)
     seen = _Seen()

@@ -11,18 +11,18 @@ from typing import TYPE_CHECKING, Any
 from ahf_ros.cli import say, tell
 from ahf_ros.cli.options import add_quiet, input_name, input_path, output_path, parsed_by
 from ahf_ros.cli.tables import identifiers, print_table
-from ahf_ros.orientation.units import decimals
+from ahf_ros.network.units import decimals
 
 if TYPE_CHECKING:
-    from ahf_ros.orientation.alignment import Alignment
-    from ahf_ros.orientation.measurement import (
+    from ahf_ros.network.alignment import Alignment
+    from ahf_ros.network.measurement import (
         Deviation,
         Distance,
         LengthTest,
         PermissibleError,
     )
-    from ahf_ros.orientation.network import FloatArray
-    from ahf_ros.orientation.points import MeasuredPoints
+    from ahf_ros.network.network import FloatArray
+    from ahf_ros.network.points import MeasuredPoints
 
 _TITLES = {
     'distances': 'Distances',
@@ -104,7 +104,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Measure, and return 1 if a file cannot be used or a length error is not permissible."""
-    from ahf_ros.interchange.network_results import read_network
+    from ahf_ros.network.files.network_results import read_network
 
     _check(options)
     try:
@@ -142,9 +142,9 @@ def _check(options: argparse.Namespace) -> None:
 
 def _measured(options: argparse.Namespace, points: MeasuredPoints) -> _Measured:
     """Return distances, deviations and the test of lengths, as far as they are asked for."""
-    from ahf_ros.interchange.control_files import read_lengths
     from ahf_ros.interchange.tables import read_points
-    from ahf_ros.orientation import measurement
+    from ahf_ros.network import measurement
+    from ahf_ros.network.files.control_files import read_lengths
 
     far: list[Distance] = []
     if options.distance or not (options.nominal or options.lengths):
@@ -166,7 +166,7 @@ def _measured(options: argparse.Namespace, points: MeasuredPoints) -> _Measured:
 def _aligned(
     options: argparse.Namespace, points: MeasuredPoints, nominal: dict[str, FloatArray]
 ) -> Alignment:
-    from ahf_ros.orientation.alignment import best_fit, three_two_one, unaligned
+    from ahf_ros.network.alignment import best_fit, three_two_one, unaligned
 
     kind = options.align or ('best-fit' if points.unit else 'similarity')
     if kind == 'none':
@@ -193,7 +193,7 @@ def _pair(text: str) -> tuple[str, str]:
 
 
 def _permissible(text: str) -> PermissibleError:
-    from ahf_ros.orientation.measurement import PermissibleError
+    from ahf_ros.network.measurement import PermissibleError
 
     try:
         numbers = [float(it) for it in text.split(',')]

@@ -10,10 +10,10 @@ from ahf_ros.base.settings.parameter import Parameter
 from ahf_ros.cli.options import add_option, input_name, parsed_by
 
 if TYPE_CHECKING:
-    from ahf_ros.interchange.network_inputs import NetworkInputs
-    from ahf_ros.orientation.mounting import Mounted
-    from ahf_ros.orientation.solution import Solution
-    from ahf_ros.orientation.transform import Transform
+    from ahf_ros.network.mounting import Mounted
+    from ahf_ros.network.read import NetworkInputs
+    from ahf_ros.network.solution import Solution
+    from ahf_ros.network.transform import Transform
 
 _OPTICAL = '_optical_frame'
 _FIELD = 'targets'
@@ -60,7 +60,7 @@ def add_mounting_arguments(group: argparse._ArgumentGroup) -> None:
 
 
 def _frames(text: str) -> tuple[str, str]:
-    from ahf_ros.interchange.robot_files import frame_name
+    from ahf_ros.network.files.robot_files import frame_name
 
     names = [it.strip() for it in text.split(',')]
     if len(names) != 2 or names[0] == names[1] or any(it != frame_name(it) for it in names):
@@ -92,8 +92,8 @@ def _on_robot(
 ) -> dict[str, Any]:
     import numpy as np
 
-    from ahf_ros.interchange.robot_files import frame_name
-    from ahf_ros.orientation.stations import mounted_on_robot
+    from ahf_ros.network.files.robot_files import frame_name
+    from ahf_ros.network.stations import mounted_on_robot
 
     result, notes = mounted_on_robot(
         solution,
@@ -117,8 +117,8 @@ def _on_robot(
 
 
 def _on_rig(solution: Solution, stations: Mapping[str, str]) -> dict[str, Any]:
-    from ahf_ros.interchange.robot_files import frame_name
-    from ahf_ros.orientation.stations import mounted_on_rig
+    from ahf_ros.network.files.robot_files import frame_name
+    from ahf_ros.network.stations import mounted_on_rig
 
     reference, result, notes = mounted_on_rig(solution, stations)
     parts = [
@@ -131,7 +131,7 @@ def _on_rig(solution: Solution, stations: Mapping[str, str]) -> dict[str, Any]:
 def _record(
     result: Mounted, parts: list[tuple[str, str, Transform]], notes: tuple[str, ...]
 ) -> dict[str, Any]:
-    from ahf_ros.interchange.robot_files import transform_record
+    from ahf_ros.network.files.robot_files import transform_record
 
     return {
         'unit': 'm',

@@ -33,15 +33,15 @@ from ahf_ros.cli.options import (
     output_path,
     parsed_by,
 )
-from ahf_ros.interchange.export.formats import NETWORK_FORMATS, parsed_export
+from ahf_ros.network.export.formats import NETWORK_FORMATS, parsed_export
 
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from ahf_ros.interchange.network_inputs import NetworkFiles, NetworkInputs
-    from ahf_ros.orientation.network import Network
-    from ahf_ros.orientation.progress import Watcher
-    from ahf_ros.orientation.solution import Solution
+    from ahf_ros.network.network import Network
+    from ahf_ros.network.progress import Watcher
+    from ahf_ros.network.read import NetworkFiles, NetworkInputs
+    from ahf_ros.network.solution import Solution
 
 REPORT_FILE = 'report.html'
 
@@ -197,8 +197,8 @@ def _datum(text: str) -> tuple[str, tuple[str, ...]]:
 def run(options: argparse.Namespace) -> int:
     """Orient the photographs, and write each group of them that hangs together."""
     need('orient')
-    from ahf_ros.interchange.network_inputs import read_network_inputs
-    from ahf_ros.orientation.verdict import contradicted
+    from ahf_ros.network.read import read_network_inputs
+    from ahf_ros.network.verdict import contradicted
 
     try:
         check_mounting(options)
@@ -221,7 +221,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _files(options: argparse.Namespace) -> NetworkFiles:
-    from ahf_ros.interchange.network_inputs import NetworkFiles
+    from ahf_ros.network.read import NetworkFiles
 
     return NetworkFiles(
         observations=options.observations,
@@ -264,9 +264,9 @@ def shown_progress(wanted: bool | None, quiet: bool) -> Iterator[Watcher | None]
 def _oriented(
     network: Network, options: argparse.Namespace, watcher: Watcher | None
 ) -> list[Solution]:
-    from ahf_ros.orientation.datum import Datum
-    from ahf_ros.orientation.orient import orient
-    from ahf_ros.orientation.solution import separated
+    from ahf_ros.network.datum import Datum
+    from ahf_ros.network.orient import orient
+    from ahf_ros.network.solution import separated
 
     datum = Datum(*options.datum) if options.datum else Datum()
     suspects = options.keep_suspects
@@ -277,7 +277,7 @@ def _of_groups(solutions: Sequence[Solution], number: int) -> tuple[str, ...]:
     """Return that a group is one of several, and that its unit is unlikely."""
     import numpy as np
 
-    from ahf_ros.orientation.units import unlikely
+    from ahf_ros.network.units import unlikely
 
     points = solutions[number].measured_points
     notes = [unlikely(float(np.linalg.norm(np.ptp(points.xyz, axis=0))), points.unit)]
@@ -293,10 +293,10 @@ def _write(
     solution: Solution, number: int, inputs: NetworkInputs, options: argparse.Namespace
 ) -> bool:
     """Write a network and its exports, print what was found, and return whether all is written."""
-    from ahf_ros.interchange.export.formats import network_remark, write_network_export
-    from ahf_ros.interchange.network_results import write_network
-    from ahf_ros.interchange.robot_files import mounting_files
-    from ahf_ros.report.network_page import network_page
+    from ahf_ros.network.export.formats import network_remark, write_network_export
+    from ahf_ros.network.files.network_results import write_network
+    from ahf_ros.network.files.robot_files import mounting_files
+    from ahf_ros.network.report.page import network_page
 
     def folder_in(place: Path) -> Path:
         return place / f'group_{number + 1}' if number else place
@@ -342,8 +342,8 @@ def print_network(solution: Solution, folder: str, console: Console | None = Non
     from rich.markup import escape
 
     from ahf_ros.cli.tables import print_table, terminal
-    from ahf_ros.orientation.verdict import verdict
-    from ahf_ros.report import network_summary
+    from ahf_ros.network.report import summary as network_summary
+    from ahf_ros.network.verdict import verdict
 
     console = console or terminal()
     judged = verdict(solution)

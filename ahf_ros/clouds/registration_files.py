@@ -13,8 +13,8 @@ from ahf_ros.base.writing import write_set
 from ahf_ros.clouds.registration.field import Field, RegisteredScan
 from ahf_ros.interchange.cloud_files import AXES, write_pcd, write_ply
 from ahf_ros.interchange.files import csv_table
-from ahf_ros.orientation.network import FloatArray
-from ahf_ros.orientation.transform import Transform
+from ahf_ros.network.network import FloatArray
+from ahf_ros.network.transform import Transform
 
 TRANSFORMS_JSON, TRANSFORMS_CSV, TARGETS_CSV = 'transforms.json', 'transforms.csv', 'targets.csv'
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from ahf_ros.base.settings.parameter import check_parameters, parameter
 from ahf_ros.base.text import shown
-from ahf_ros.orientation.units import METRES
+from ahf_ros.network.units import METRES
 
 _FRAME = re.compile(r'[A-Za-z_][\w.-]*(/[\w.-]+)*', re.ASCII)
 

@@ -16,8 +16,8 @@ from ahf_ros.clouds.registration.field import RegisteredScan
 from ahf_ros.clouds.registration.session import Registration
 from ahf_ros.clouds.registration_files import ScanRecord
 from ahf_ros.clouds.registration_settings import RegistrationSettings
-from ahf_ros.interchange.coordinate_files import read_coordinates
-from ahf_ros.orientation.points import MeasuredPoints
+from ahf_ros.network.files.coordinate_files import read_coordinates
+from ahf_ros.network.points import MeasuredPoints
 
 
 def located(

@@ -38,7 +38,7 @@ from ahf_ros.drawing.overlay import DECODED_COLOUR, DOUBTFUL_COLOUR, Colour
 from ahf_ros.interchange.cloud_files import AXES
 from ahf_ros.interchange.target_messages import has_corners
 from ahf_ros.msg import CodedTarget, CodedTargetArray
-from ahf_ros.orientation.transform import Transform
+from ahf_ros.network.transform import Transform
 from ahf_ros.prints.square import library_name
 
 _DATATYPES = {kind: number for number, kind in NUMBERS.items()}

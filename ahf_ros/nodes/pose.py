@@ -19,10 +19,18 @@ from std_msgs.msg import Header
 from ahf_ros.base.target import UNDECODED, Target
 from ahf_ros.base.text import listed, printable
 from ahf_ros.interchange.camera_info import Calibration, places_with_covariances
-from ahf_ros.interchange.coordinate_files import read_coordinates
 from ahf_ros.interchange.image_messages import nanoseconds
 from ahf_ros.interchange.target_messages import identification_from, is_answered
 from ahf_ros.msg import CodedTargetArray
+from ahf_ros.network.files.coordinate_files import read_coordinates
+from ahf_ros.network.points import blocks
+from ahf_ros.network.pose import Pose
+from ahf_ros.network.single_image import (
+    NamedPlaces,
+    centre_covariances,
+    known_targets,
+    pose_of,
+)
 from ahf_ros.nodes.diagnostics import PERIOD, PoseDiagnostics, PoseTally, publish_status
 from ahf_ros.nodes.messages import (
     PosedTarget,
@@ -38,14 +46,6 @@ from ahf_ros.nodes.tf import Frames
 from ahf_ros.nodes.topics import ANSWERS_KEPT, DETECTIONS
 from ahf_ros.nodes.undistortion import Calibrations
 from ahf_ros.nodes.watch import Expected, Silence, other_types, silence, topics_of_others
-from ahf_ros.orientation.points import blocks
-from ahf_ros.orientation.pose import Pose
-from ahf_ros.orientation.single_image import (
-    NamedPlaces,
-    centre_covariances,
-    known_targets,
-    pose_of,
-)
 
 POSE = '~/pose'
 """Topic of the pose of the camera in the frame of the targets."""

@@ -18,9 +18,9 @@ from collections.abc import Sequence
 
 import numpy as np
 from ahf_ros import orient
-from ahf_ros.interchange.control_files import read_scale_bars
-from ahf_ros.interchange.network_files import make_network
-from ahf_ros.interchange.observation_files import read_observations
+from ahf_ros.network.files.control_files import read_scale_bars
+from ahf_ros.network.files.network_files import make_network
+from ahf_ros.network.files.observation_files import read_observations
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

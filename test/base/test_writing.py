@@ -21,9 +21,9 @@ from ahf_ros.base.inputs import inputs_kept, register_input
 from ahf_ros.base.writing import complete, locked, write_files, write_set, write_whole
 from ahf_ros.clouds.registration.field import Field, added
 from ahf_ros.clouds.registration_files import ScanRecord, write_registration
-from ahf_ros.interchange.export.formats import write_network_export
-from ahf_ros.interchange.network_results import read_network, write_network
-from ahf_ros.orientation.transform import Transform
+from ahf_ros.network.export.formats import write_network_export
+from ahf_ros.network.files.network_results import read_network, write_network
+from ahf_ros.network.transform import Transform
 from support import ROOT
 from support.disk import room_for
 from support.faults import with_fault

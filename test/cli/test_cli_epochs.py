@@ -11,7 +11,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from ahf_ros.interchange.network_results import write_network
+from ahf_ros.network.files.network_results import write_network
 from support.command_line import status as run
 from support.epochs import epoch
 

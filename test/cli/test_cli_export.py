@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from ahf_ros.interchange.export.formats import FORMATS
+from ahf_ros.network.export.formats import FORMATS
 from support.command_line import ahf, status
 from support.exported import READERS
 

@@ -13,8 +13,8 @@ import pytest
 
 from ahf_ros import Identification
 from ahf_ros.base.extras import EXTRAS, REQUIRED, MissingExtra, missing
-from ahf_ros.interchange.network_results import write_network
-from ahf_ros.orientation.testing import unit_weight
+from ahf_ros.network.files.network_results import write_network
+from ahf_ros.network.testing import unit_weight
 from ahf_ros.prints.gsi import point_family, positions_of
 from support import ROOT
 from support.command_line import python, status

@@ -16,11 +16,11 @@ import numpy as np
 import pytest
 from ruamel.yaml import YAML
 
-from ahf_ros.interchange.camera_files import ros_yaml
-from ahf_ros.interchange.network_results import read_network
-from ahf_ros.interchange.robot_files import read_robot_poses
-from ahf_ros.orientation.network import CameraView
-from ahf_ros.orientation.transform import Transform
+from ahf_ros.network.files.camera_files import ros_yaml
+from ahf_ros.network.files.network_results import read_network
+from ahf_ros.network.files.robot_files import read_robot_poses
+from ahf_ros.network.network import CameraView
+from ahf_ros.network.transform import Transform
 from support import ROOT, environment
 from support.command_line import status
 from support.networks import CALIBRATION, SIZE, records, solution

@@ -9,8 +9,8 @@ from ahf_ros.clouds.registration.field import added, known_field
 from ahf_ros.clouds.registration.rigid import chi_square_limit
 from ahf_ros.clouds.registration.scan import Scan
 from ahf_ros.clouds.registration.session import Registration
-from ahf_ros.orientation.network import FloatArray
-from ahf_ros.orientation.points import MeasuredPoints
+from ahf_ros.network.network import FloatArray
+from ahf_ros.network.points import MeasuredPoints
 from support.scans import measured, ring, squared_error, station
 
 SIGMA = 20e-6  # m

@@ -25,6 +25,8 @@ from ahf_ros.clouds.point_clouds import COVARIANCE
 from ahf_ros.detectors import create_detector
 from ahf_ros.interchange.target_messages import coded_target_array
 from ahf_ros.msg import CodedTarget, CodedTargetArray
+from ahf_ros.network.camera import rotation_matrices
+from ahf_ros.network.transform import Transform
 from ahf_ros.nodes.messages import (
     PosedTarget,
     apriltag_detections,
@@ -38,8 +40,6 @@ from ahf_ros.nodes.messages import (
     target_transform,
     transform_message,
 )
-from ahf_ros.orientation.camera import rotation_matrices
-from ahf_ros.orientation.transform import Transform
 from ahf_ros.prints.square import marker
 
 SEEN = Target(18, 71, 100.0, 50.0, 20.0, 10.0, math.pi / 2, confidence=0.75)

@@ -26,7 +26,7 @@ from std_msgs.msg import Header
 from ahf_ros.base.target import Target
 from ahf_ros.interchange.camera_info import calibration, undistorted
 from ahf_ros.msg import CodedTarget, CodedTargetArray
-from ahf_ros.orientation.camera import project
+from ahf_ros.network.camera import project
 from support.detector import overrides, own, values
 from support.poses import CAMERA, SIZE, View, view
 

@@ -27,10 +27,10 @@ from ahf_ros.clouds.point_clouds import (
 )
 from ahf_ros.clouds.registration.scan import Scan
 from ahf_ros.interchange.cloud_files import read_cloud
-from ahf_ros.interchange.coordinate_files import read_coordinates
+from ahf_ros.network.camera import rotation_matrices
+from ahf_ros.network.files.coordinate_files import read_coordinates
+from ahf_ros.network.transform import Transform, rotation_vector
 from ahf_ros.nodes.messages import cloud_message
-from ahf_ros.orientation.camera import rotation_matrices
-from ahf_ros.orientation.transform import Transform, rotation_vector
 from support.detector import overrides, own, values
 from support.scans import measured, ring, squared_error, station
 

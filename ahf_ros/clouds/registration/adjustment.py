@@ -15,9 +15,9 @@ from ahf_ros.base.text import counted
 from ahf_ros.clouds.registration.field import Field, RegisteredScan
 from ahf_ros.clouds.registration.rigid import chi_square_limit
 from ahf_ros.clouds.registration.scan import Scan
-from ahf_ros.orientation.network import FloatArray, IntArray
-from ahf_ros.orientation.points import entries
-from ahf_ros.orientation.transform import Transform
+from ahf_ros.network.network import FloatArray, IntArray
+from ahf_ros.network.points import entries
+from ahf_ros.network.transform import Transform
 
 _ROUNDS = 30
 _CONVERGED = 1e-10  # decrease of the sum of weighted squares that a step promises

@@ -15,9 +15,9 @@ import numpy as np
 
 from ahf_ros.clouds.registration.refusals import Match, check_shape, checked_fit
 from ahf_ros.clouds.registration.scan import Scan, block_diagonal
-from ahf_ros.orientation.network import FloatArray, IntArray
-from ahf_ros.orientation.points import MeasuredPoints, blocks, entries
-from ahf_ros.orientation.transform import Transform
+from ahf_ros.network.network import FloatArray, IntArray
+from ahf_ros.network.points import MeasuredPoints, blocks, entries
+from ahf_ros.network.transform import Transform
 
 _EXACT = 1e-6  # m, of known coordinates, beside their own precision
 

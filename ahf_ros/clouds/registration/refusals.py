@@ -9,9 +9,9 @@ import numpy as np
 
 from ahf_ros.base.text import counted, listed
 from ahf_ros.clouds.registration.rigid import Fit, fit
-from ahf_ros.orientation.network import FloatArray
-from ahf_ros.orientation.points import entries
-from ahf_ros.orientation.similarity import similarity_between
+from ahf_ros.network.network import FloatArray
+from ahf_ros.network.points import entries
+from ahf_ros.network.similarity import similarity_between
 
 NARROW = 0.03
 """Smallest accepted width of a field of targets across its length, relative to this."""

@@ -17,9 +17,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ahf_ros.clouds.registration.scan import block_diagonal
-from ahf_ros.orientation.network import FloatArray
-from ahf_ros.orientation.similarity import similarity_between
-from ahf_ros.orientation.transform import Transform
+from ahf_ros.network.network import FloatArray
+from ahf_ros.network.similarity import similarity_between
+from ahf_ros.network.transform import Transform
 
 _ROUNDS = 50
 _CONVERGED = 1e-12  # decrease of the sum of weighted squares that a step promises, relative

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ahf_ros.base.text import shown
-from ahf_ros.orientation.network import FloatArray, IntArray
+from ahf_ros.network.network import FloatArray, IntArray
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ from ahf_ros.base.blas import one_blas_thread
 from ahf_ros.clouds.registration.adjustment import Adjusted, adjusted
 from ahf_ros.clouds.registration.field import Field, RegisteredScan, added, known_field
 from ahf_ros.clouds.registration.scan import Scan
-from ahf_ros.orientation.points import MeasuredPoints
+from ahf_ros.network.points import MeasuredPoints
 
 
 class Registration:

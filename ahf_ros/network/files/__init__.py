@@ -1,0 +1,1 @@
+"""Files of networks: what is observed and known, and what is computed."""

@@ -1,0 +1,1 @@
+"""A network as one page, as tables and as figures."""

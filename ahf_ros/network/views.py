@@ -1,0 +1,93 @@
+"""Observations by photograph, and which of them agree with approximate values."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ahf_ros.network import normals
+from ahf_ros.network.camera import undistort
+from ahf_ros.network.network import FloatArray, IntArray, Network
+from ahf_ros.network.refinement import free_parameters
+from ahf_ros.network.solution import Start
+from ahf_ros.network.triangulation import largest_angle
+
+NOWHERE = 1e3
+"""Coordinate in focal lengths, far outside every image."""
+
+
+@dataclass(frozen=True)
+class View:
+    """What one photograph shows: points by index in ascending order, px, and rows in the network.
+
+    `sigma` (n,) is the standard deviation of a coordinate in px, the mean of both.
+    """
+
+    camera: int
+    points: IntArray
+    xy: FloatArray
+    sigma: FloatArray
+    rows: IntArray
+    equidistant: bool = False
+
+    def normalised(self, calibrations: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return places (n, 2) in the plane z = 1, and their standard deviations (n,).
+
+        Where the lens has no place, that is one that agrees with nothing.
+        """
+        calibration = calibrations[self.camera]
+        places = undistort(calibration, self.xy, equidistant=self.equidistant)
+        places = np.nan_to_num(places, nan=NOWHERE)
+        return places, self.sigma / calibration[0]
+
+
+def views_of(network: Network) -> list[View]:
+    """Return what each photograph shows; of targets seen twice in one, the first place."""
+    observed = network.observations
+    sigma = np.sqrt(np.trace(observed.covariance, axis1=1, axis2=2) / 2)
+    made = []
+    for photograph, camera in enumerate(network.camera_of):
+        rows = np.flatnonzero(observed.photograph == photograph)
+        points, first = np.unique(observed.point[rows], return_index=True)
+        rows = rows[first]
+        fisheye = network.cameras[camera].equidistant
+        made.append(View(int(camera), points, observed.xy[rows], sigma[rows], rows, fisheye))
+    return made
+
+
+def lengths_of(network: Network, start: Start) -> FloatArray:
+    """Return residuals (m,) in standard deviations, NaN where pose or point are not known.
+
+    Points behind a camera that has a pose have infinite ones.
+    """
+    observed = network.observations
+    known = np.isfinite(start.positions[observed.photograph, 0])
+    known &= np.isfinite(start.points[observed.point, 0])
+    lengths = np.full(len(observed.xy), np.nan)
+    lengths[known] = np.inf
+    every = np.ones(len(known), dtype=bool)
+    layout = normals.lay_out(network, start, every, free_parameters(network, ()))
+    if len(layout.xy):
+        lengths[layout.observations] = normals.whitened_lengths(layout, start)
+    return lengths
+
+
+def spread_of(lengths: FloatArray) -> float:
+    """Return the robust spread of residuals in standard deviations, at least one."""
+    known = lengths[~np.isnan(lengths)]
+    return max(1.0, normals.robust_spread(known)) if len(known) else np.inf
+
+
+def largest_angles(network: Network, start: Start) -> FloatArray:
+    """Return the largest angle between two used rays of each target, rad; NaN below two rays."""
+    angles = np.full(len(network.targets), np.nan)
+    observed = network.observations
+    for target in range(len(network.targets)):
+        photographs = observed.photograph[(observed.point == target) & start.used]
+        directions = start.positions[photographs] - start.points[target]
+        directions = directions[np.isfinite(directions).all(axis=1)]
+        if len(directions) > 1:
+            directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+            angles[target] = largest_angle(directions)
+    return angles
