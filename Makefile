@@ -116,7 +116,7 @@ test-kilted:
 	$(MAKE) DISTRIBUTION=kilted .venv-kilted/nodes
 	.venv-kilted/bin/python -m pip install $(QUIET) 'ahf_ros[bag]' hypothesis pytest
 	.venv-kilted/bin/python -m pytest -m 'not lasting' \
-		$$(grep -lrE 'rclpy|graph: ' test/bag test/clouds test/interchange test/nodes \
+		$$(grep -lrE 'rclpy|graph: ' test/bag test/clouds test/files test/nodes \
 			--include='test_*.py')
 
 # With ROS 2 from PyPI; where one is sourced, run the script itself.

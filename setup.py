@@ -13,7 +13,7 @@ setup(
     package_data={
         '': ['*.json', 'py.typed'],
         'ahf_ros.prints': ['ring_families/*'],
-        'ahf_ros.interchange': ['html/*'],
+        'ahf_ros.files': ['html/*'],
         'ahf_ros.network.report': ['html/*'],
         'ahf_ros.report': ['page/*'],
     },

@@ -33,11 +33,11 @@ _MODULES = {
     'draw': 'drawing.overlay',
     'identify': 'session',
     'orient': 'network.orient',
-    'read_image': 'interchange.image_files',
+    'read_image': 'files.image_files',
     'render': 'synthetic.scene',
     'resect': 'network.single_image',
     'score': 'evaluation',
-    'write_image': 'interchange.image_files',
+    'write_image': 'files.image_files',
 }
 
 if TYPE_CHECKING:  # which takes what is imported `as` itself for public
@@ -57,10 +57,10 @@ if TYPE_CHECKING:  # which takes what is imported `as` itself for public
     from ahf_ros.detectors import create_detector as create_detector
     from ahf_ros.drawing.overlay import draw as draw
     from ahf_ros.evaluation import score as score
+    from ahf_ros.files.image_files import read_image as read_image
+    from ahf_ros.files.image_files import write_image as write_image
     from ahf_ros.filtering.identifier import Identifier as Identifier
     from ahf_ros.filtering.settings import AdaptiveSettings as AdaptiveSettings
-    from ahf_ros.interchange.image_files import read_image as read_image
-    from ahf_ros.interchange.image_files import write_image as write_image
     from ahf_ros.network.adjustment import adjust as adjust
     from ahf_ros.network.congruence import compare as compare
     from ahf_ros.network.orient import orient as orient

@@ -17,10 +17,10 @@ import numpy as np
 from ahf_ros.base.target import Identification, Target, count_codes
 from ahf_ros.base.text import printable, reason_of
 from ahf_ros.detectors.contract import Detector, Unavailable
+from ahf_ros.files.image_files import NotedImage
+from ahf_ros.files.image_messages import decode_compressed, decode_image, nanoseconds
+from ahf_ros.files.target_messages import DROPPED, FAILED, REJECTED
 from ahf_ros.filtering.identifier import Identifier, Memory
-from ahf_ros.interchange.image_files import NotedImage
-from ahf_ros.interchange.image_messages import decode_compressed, decode_image, nanoseconds
-from ahf_ros.interchange.target_messages import DROPPED, FAILED, REJECTED
 from ahf_ros.session import create_identifier
 from ahf_ros.session_settings import SLIDING, IdentificationSettings, StackSettings
 from ahf_ros.vision.image import check_image

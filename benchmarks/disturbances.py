@@ -24,8 +24,8 @@ from ahf_ros.base.target import Target, TrueTarget
 from ahf_ros.detectors import DetectorSettings, create_detector
 from ahf_ros.detectors.contract import Detector, Expecting
 from ahf_ros.evaluation import FALSE, RIGHT, WRONG, judge
-from ahf_ros.interchange.image_files import read_image
-from ahf_ros.interchange.truth_files import read_truth
+from ahf_ros.files.image_files import read_image
+from ahf_ros.files.truth_files import read_truth
 from ahf_ros.prints import RING_NAMES
 from ahf_ros.prints.families import AUTO, KINDS
 from ahf_ros.prints.ring import FAMILY_NAMES, family

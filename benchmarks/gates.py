@@ -34,7 +34,7 @@ import cv2
 import numpy as np
 from ruamel.yaml import YAML
 
-from ahf_ros.interchange.truth_files import read_truth
+from ahf_ros.files.truth_files import read_truth
 from ahf_ros.prints.families import KINDS
 from ahf_ros.synthetic.scene import SceneSettings, render
 from benchmarks import report

@@ -21,7 +21,7 @@ from typing import Any
 
 from ahf_ros.detectors import create_detector
 from ahf_ros.evaluation import score
-from ahf_ros.interchange.image_files import read_image
+from ahf_ros.files.image_files import read_image
 from ahf_ros.synthetic.scene import SceneSettings, render
 from benchmarks import report
 from benchmarks.report import number, table

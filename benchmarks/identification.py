@@ -25,8 +25,8 @@ from typing import Any
 import numpy as np
 
 from ahf_ros.detectors import DETECTOR_NAMES, DetectorSettings, create_detector
-from ahf_ros.interchange.image_files import read_image
-from ahf_ros.interchange.truth_files import read_truth
+from ahf_ros.files.image_files import read_image
+from ahf_ros.files.truth_files import read_truth
 from ahf_ros.prints.ring import FAMILY_NAMES
 from ahf_ros.synthetic.patterns import LIGHT_NAMES, benchmark_lights
 from ahf_ros.synthetic.scene import SceneSettings

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from hypothesis import strategies as st
 
-from ahf_ros.interchange.image_messages import ENCODINGS
+from ahf_ros.files.image_messages import ENCODINGS
 
 Fields = dict[str, Any]
 """The fields of a message by their names."""

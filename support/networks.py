@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ahf_ros.base.target import Identification, Target
-from ahf_ros.interchange.target_json import to_json
+from ahf_ros.files.target_json import to_json
 from ahf_ros.network.camera import pinhole, project
 from ahf_ros.network.network import (
     CameraView,

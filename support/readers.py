@@ -18,13 +18,13 @@ import numpy as np
 
 from ahf_ros.base.extras import missing
 from ahf_ros.cli.identify import image_paths
-from ahf_ros.interchange.arrays import read_arrays
-from ahf_ros.interchange.cloud_files import read_cloud, write_pcd, write_ply
-from ahf_ros.interchange.exif import read_exif
-from ahf_ros.interchange.image_files import read_noted_image
-from ahf_ros.interchange.tables import POINT, read_by_image, read_points, read_table
-from ahf_ros.interchange.target_json import read_results
-from ahf_ros.interchange.truth_files import read_truth
+from ahf_ros.files.arrays import read_arrays
+from ahf_ros.files.cloud_files import read_cloud, write_pcd, write_ply
+from ahf_ros.files.exif import read_exif
+from ahf_ros.files.image_files import read_noted_image
+from ahf_ros.files.tables import POINT, read_by_image, read_points, read_table
+from ahf_ros.files.target_json import read_results
+from ahf_ros.files.truth_files import read_truth
 from ahf_ros.network.export.survey import read_measured_images
 from ahf_ros.network.files.camera_files import read_camera
 from ahf_ros.network.files.control_files import read_control, read_lengths, read_scale_bars

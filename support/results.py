@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from ahf_ros.base.target import FilterState, Identification, SearchTrace, Target, UndecodedTarget
-from ahf_ros.interchange.image_files import write_image
-from ahf_ros.interchange.target_json import to_json
+from ahf_ros.files.image_files import write_image
+from ahf_ros.files.target_json import to_json
 
 SHAPE = 120, 160
 COVARIANCE = (1e-4, 0.0, 0.0, 1e-4)

@@ -9,7 +9,7 @@ import numpy as np
 from ahf_ros.base.target import Target
 from ahf_ros.clouds.localisation import positions
 from ahf_ros.clouds.registration.scan import Scan
-from ahf_ros.interchange.cloud_files import AXES
+from ahf_ros.files.cloud_files import AXES
 from ahf_ros.network.camera import rotation_matrices
 from ahf_ros.network.network import FloatArray
 from ahf_ros.network.transform import Transform

@@ -22,8 +22,8 @@ pytest.importorskip('rosbags', reason='rosbags is not installed')
 from ahf_ros import SceneSettings, create_detector, identify, render
 from ahf_ros.bag.definitions import typestore
 from ahf_ros.cli import main
-from ahf_ros.interchange.image_files import write_image
-from ahf_ros.interchange.target_json import targets_from_json
+from ahf_ros.files.image_files import write_image
+from ahf_ros.files.target_json import targets_from_json
 from support import bags
 from support.packages import MINE, my_detector, write_package
 from support.square_markers import needs_square_markers

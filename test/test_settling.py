@@ -16,7 +16,7 @@ import pytest
 from ahf_ros.base.target import Target
 from ahf_ros.detectors import create_detector
 from ahf_ros.detectors.explained import without_targets
-from ahf_ros.interchange.image_files import write_image
+from ahf_ros.files.image_files import write_image
 from ahf_ros.session import create_identifier, identify
 from ahf_ros.settling import FIRST, evident, evident_together
 from ahf_ros.synthetic.scene import SceneSettings, render

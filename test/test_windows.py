@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from ahf_ros.detectors.external.command import words_of
-from ahf_ros.interchange.files import checked_file_name
+from ahf_ros.files.files import checked_file_name
 from support import ROOT, packages
 from support.command_line import python, status
 
@@ -128,7 +128,7 @@ def test_commands_of_windows_have_words(command: str, words: list[str]) -> None:
 
 
 def test_tests_of_the_core() -> None:
-    files = ('interchange/test_target_json.py', 'vision/test_stack.py', 'prints/test_families.py')
+    files = ('files/test_target_json.py', 'vision/test_stack.py', 'prints/test_families.py')
     done = python(
         '-c', TESTS.replace('{without}', WITHOUT_POSIX), *(ROOT / 'test' / it for it in files)
     )

@@ -25,7 +25,7 @@ from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_
 
 import ahf_ros
 from ahf_ros.base.text import reason_of
-from ahf_ros.interchange.target_messages import MessageTypes
+from ahf_ros.files.target_messages import MessageTypes
 
 if TYPE_CHECKING:
     from rosbags.typesys.store import Typestore
@@ -80,7 +80,7 @@ def typestore() -> Typestore:
 
 
 def message_types(store: Typestore) -> MessageTypes:
-    """Return the message classes for `ahf_ros.interchange.target_messages`."""
+    """Return the message classes for `ahf_ros.files.target_messages`."""
     classes: Any = {name: store.types[f'ahf_ros/msg/{name}'] for name in _NAMES}
     return SimpleNamespace(**classes)
 

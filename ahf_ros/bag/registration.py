@@ -26,8 +26,8 @@ from ahf_ros.clouds.point_clouds import organised_points
 from ahf_ros.clouds.registration_files import write_registration
 from ahf_ros.clouds.registration_settings import RegistrationSettings
 from ahf_ros.clouds.scans import Scans, known_targets, located, scan_cloud
-from ahf_ros.interchange.image_messages import nanoseconds
-from ahf_ros.interchange.target_messages import is_answered
+from ahf_ros.files.image_messages import nanoseconds
+from ahf_ros.files.target_messages import is_answered
 
 POINT_CLOUD = 'sensor_msgs/msg/PointCloud2'
 

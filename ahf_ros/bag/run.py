@@ -45,7 +45,7 @@ from ahf_ros.base.writing import locked
 from ahf_ros.detectors import create_detector
 from ahf_ros.detectors.contract import Unavailable
 from ahf_ros.drawing.overlay import draw
-from ahf_ros.interchange.target_messages import coded_target_array, unanswered
+from ahf_ros.files.target_messages import coded_target_array, unanswered
 from ahf_ros.session_settings import IdentificationSettings, StackSettings
 from ahf_ros.settling import settled_families
 from ahf_ros.stream import STATUS, Answer, Frame, Kind, Remark, Stream, message_frame, why_failed

@@ -27,7 +27,7 @@ from ahf_ros.base.writing import locked, whole_file
 from ahf_ros.batch.engine import Engine, Finished, TaskFailed, finished_tasks, in_order
 from ahf_ros.batch.identification import file_fingerprint
 from ahf_ros.batch.task import ImageOutcome, ImageTask, Level, Message
-from ahf_ros.interchange.files import RESULTS_FILE
+from ahf_ros.files.files import RESULTS_FILE
 
 PREVIOUS = 'previous.jsonl'
 """Name of the file with the results that a run with other settings replaces."""

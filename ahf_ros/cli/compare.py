@@ -64,7 +64,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Compare the epochs, show what moved, and write files."""
     from ahf_ros.base.writing import write_whole
-    from ahf_ros.interchange.files import csv_table
+    from ahf_ros.files.files import csv_table
     from ahf_ros.network.congruence import compare
     from ahf_ros.network.files.network_results import read_network
 

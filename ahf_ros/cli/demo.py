@@ -21,8 +21,8 @@ from ahf_ros.drawing.overlay import (
 )
 from ahf_ros.drawing.tiles import Tile, side_by_side
 from ahf_ros.evaluation import FALSE, RIGHT, WRONG, judge, line, method
+from ahf_ros.files.image_files import write_image
 from ahf_ros.filtering.homomorphic import filtered
-from ahf_ros.interchange.image_files import write_image
 from ahf_ros.session import create_identifier
 from ahf_ros.synthetic.patterns import LIGHT_NAMES
 from ahf_ros.synthetic.scene import SceneSettings, render

@@ -12,8 +12,8 @@ from ahf_ros.base.text import printable
 from ahf_ros.cli import tell
 from ahf_ros.cli.options import add_option, input_name
 from ahf_ros.evaluation import TOLERANCE, Score, evaluate, table, total
-from ahf_ros.interchange.target_json import read_results
-from ahf_ros.interchange.truth_files import read_truth
+from ahf_ros.files.target_json import read_results
+from ahf_ros.files.truth_files import read_truth
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -99,7 +99,7 @@ def control_from(options: argparse.Namespace) -> Control | None:
     """
     if options.control is None:
         return None
-    from ahf_ros.interchange.tables import read_points
+    from ahf_ros.files.tables import read_points
     from ahf_ros.network.export.survey import Control
 
     points = read_points(options.control)

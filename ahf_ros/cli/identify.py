@@ -39,7 +39,7 @@ from ahf_ros.cli.options import (
     output_path,
     settings_from,
 )
-from ahf_ros.interchange.files import RESULTS_FILE
+from ahf_ros.files.files import RESULTS_FILE
 from ahf_ros.prints.families import AUTO
 from ahf_ros.session_settings import IdentificationSettings, StackSettings
 
@@ -243,7 +243,7 @@ def _hint(settings: IdentificationSettings, identified: int) -> list[str]:
 def _advice(paths: Sequence[str], settings: IdentificationSettings) -> list[str]:
     """Return lines on the first image in which nothing was identified that says why, or on all."""
     from ahf_ros.advice import advice_on_all
-    from ahf_ros.interchange.image_files import read_image
+    from ahf_ros.files.image_files import read_image
     from ahf_ros.vision.image import check_image
 
     def images() -> Iterator[tuple[str, np.ndarray]]:
@@ -362,7 +362,7 @@ def image_paths(arguments: Sequence[str]) -> tuple[list[str], list[str], list[st
 
 
 def _named(argument: str, left_out: list[str]) -> Iterator[str]:
-    from ahf_ros.interchange.image_files import image_suffixes
+    from ahf_ros.files.image_files import image_suffixes
 
     path, suffixes = Path(argument), image_suffixes()
     if is_url(argument):

@@ -97,7 +97,7 @@ def run(options: argparse.Namespace) -> int:
 def _learn_rings(options: argparse.Namespace) -> int:
     from ahf_ros.detectors.learning.rings import learn_families
     from ahf_ros.detectors.ring.bands import MINIMUM_TARGETS, Bands, find_bands
-    from ahf_ros.interchange.image_files import read_image
+    from ahf_ros.files.image_files import read_image
 
     paths, problems, left_out = image_paths(options.sources)
     for problem in (*problems, *left_out):
@@ -212,7 +212,7 @@ def _contact_sheet(learnt: LearntFamily, crops: dict[bytes, np.ndarray]) -> np.n
 
 def _learn_points(options: argparse.Namespace, points: str) -> int:
     from ahf_ros.detectors.learning.points import learn_family, library_text, with_codes
-    from ahf_ros.interchange.tables import read_points
+    from ahf_ros.files.tables import read_points
     from ahf_ros.prints.gsi import point_family
 
     radius = options.dot_radius

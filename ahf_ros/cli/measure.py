@@ -142,7 +142,7 @@ def _check(options: argparse.Namespace) -> None:
 
 def _measured(options: argparse.Namespace, points: MeasuredPoints) -> _Measured:
     """Return distances, deviations and the test of lengths, as far as they are asked for."""
-    from ahf_ros.interchange.tables import read_points
+    from ahf_ros.files.tables import read_points
     from ahf_ros.network import measurement
     from ahf_ros.network.files.control_files import read_lengths
 
@@ -259,7 +259,7 @@ def _show(points: MeasuredPoints, *found: Any) -> None:
 
 def _write(folder: Path, *found: Any) -> None:
     from ahf_ros.base.writing import write_files
-    from ahf_ros.interchange.files import csv_table
+    from ahf_ros.files.files import csv_table
 
     tables = {
         f'{name}.csv': csv_table([_cell(value, '.9g') for value in row] for row in rows)

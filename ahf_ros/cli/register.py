@@ -67,7 +67,7 @@ def run(options: argparse.Namespace) -> int:
 
     from ahf_ros.clouds.registration_files import write_registration
     from ahf_ros.clouds.scans import Scans, known_targets
-    from ahf_ros.interchange.cloud_files import read_cloud
+    from ahf_ros.files.cloud_files import read_cloud
     from ahf_ros.session import create_identifier
 
     identifier = create_identifier(settings=settings)
@@ -102,7 +102,7 @@ def run(options: argparse.Namespace) -> int:
 
 def _pairs(folder: Path) -> Iterator[tuple[Path, Path]]:
     """Yield the clouds of a folder, sorted by name, with the image of each."""
-    from ahf_ros.interchange.image_files import image_suffixes
+    from ahf_ros.files.image_files import image_suffixes
 
     if not folder.is_dir():
         raise ValueError(f'{folder} is no folder, accepted is one with PLY or PCD files')
@@ -127,8 +127,8 @@ def _target_points(
     """Return the targets of a scan with their positions, as the node detector publishes them."""
     from ahf_ros.clouds.localisation import labelled
     from ahf_ros.clouds.scans import located
-    from ahf_ros.interchange.cloud_files import read_cloud
-    from ahf_ros.interchange.image_files import read_image
+    from ahf_ros.files.cloud_files import read_cloud
+    from ahf_ros.files.image_files import read_image
 
     cloud, image = read_cloud(cloud_file), read_image(image_file)
     targets = identifier.identify(image).targets

@@ -14,8 +14,8 @@ from ahf_ros.base.settings.parameter import Parameter
 from ahf_ros.base.target import TrueTarget
 from ahf_ros.cli import say, tell
 from ahf_ros.cli.options import add_option, output_path, settings_from
-from ahf_ros.interchange.image_files import write_image
-from ahf_ros.interchange.truth_files import read_truth, write_truth
+from ahf_ros.files.image_files import write_image
+from ahf_ros.files.truth_files import read_truth, write_truth
 from ahf_ros.synthetic.bent.picture import BentRendering, render_bent
 from ahf_ros.synthetic.bent.settings import BentSettings
 from ahf_ros.synthetic.scene import Rendering, SceneSettings, render

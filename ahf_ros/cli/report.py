@@ -17,7 +17,7 @@ from ahf_ros.cli.options import (
     output_path,
     settings_from,
 )
-from ahf_ros.interchange.truth_files import read_truth
+from ahf_ros.files.truth_files import read_truth
 from ahf_ros.report.page import ReportSettings, write_page
 from ahf_ros.report.results import read_results
 

@@ -26,8 +26,8 @@ from ahf_ros.cli.options import (
     output_path,
     settings_from,
 )
-from ahf_ros.interchange.files import RESULTS_FILE
-from ahf_ros.interchange.image_files import image_suffixes
+from ahf_ros.files.files import RESULTS_FILE
+from ahf_ros.files.image_files import image_suffixes
 from ahf_ros.session_settings import IdentificationSettings
 
 

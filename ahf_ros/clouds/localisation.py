@@ -34,7 +34,7 @@ import numpy as np
 from ahf_ros.base.target import Target
 from ahf_ros.clouds.cloud_settings import FULL, NEIGHBOURHOOD, CloudGrid
 from ahf_ros.clouds.point_clouds import COVARIANCE, TARGET_POINT
-from ahf_ros.interchange.cloud_files import AXES
+from ahf_ros.files.cloud_files import AXES
 from ahf_ros.vision.robust import NORMAL
 
 MINIMUM_POINTS = 12

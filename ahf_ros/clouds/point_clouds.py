@@ -13,8 +13,8 @@ import numpy as np
 from ahf_ros.base.target import UNDECODED
 from ahf_ros.base.text import shown
 from ahf_ros.clouds.registration.scan import Scan
-from ahf_ros.interchange.cloud_files import AXES
-from ahf_ros.interchange.image_messages import check_rows
+from ahf_ros.files.cloud_files import AXES
+from ahf_ros.files.image_messages import check_rows
 
 COVARIANCE = ('xx', 'xy', 'xz', 'yy', 'yz', 'zz')
 """Fields of target points with the covariance of x, y and z."""

@@ -11,8 +11,8 @@ import numpy as np
 
 from ahf_ros.base.writing import write_set
 from ahf_ros.clouds.registration.field import Field, RegisteredScan
-from ahf_ros.interchange.cloud_files import AXES, write_pcd, write_ply
-from ahf_ros.interchange.files import csv_table
+from ahf_ros.files.cloud_files import AXES, write_pcd, write_ply
+from ahf_ros.files.files import csv_table
 from ahf_ros.network.network import FloatArray
 from ahf_ros.network.transform import Transform
 

@@ -7,8 +7,8 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from ahf_ros.interchange.exif import Exif, equivalent_in_px, read_exif
-from ahf_ros.interchange.image_files import find_image
+from ahf_ros.files.exif import Exif, equivalent_in_px, read_exif
+from ahf_ros.files.image_files import find_image
 from ahf_ros.network.files.camera_files import read_camera
 from ahf_ros.network.files.control_files import read_control, read_scale_bars
 from ahf_ros.network.files.network_files import CameraKnowledge, make_network, read_cameras

@@ -15,7 +15,7 @@ from ahf_ros.clouds.localisation import Positions
 from ahf_ros.clouds.matching import ANSWER, ANSWERS, CLOUD, Matcher, Waiting
 from ahf_ros.clouds.point_clouds import organised_points
 from ahf_ros.clouds.scans import located
-from ahf_ros.interchange.image_messages import nanoseconds
+from ahf_ros.files.image_messages import nanoseconds
 from ahf_ros.msg import CodedTargetArray
 from ahf_ros.nodes.diagnostics import CloudTally
 from ahf_ros.nodes.inputs import Input

@@ -12,7 +12,7 @@ from std_msgs.msg import Header
 from ahf_ros.base.edge_shift import edge_shift_remark
 from ahf_ros.base.target import Identification
 from ahf_ros.base.text import printable
-from ahf_ros.interchange.image_messages import nanoseconds
+from ahf_ros.files.image_messages import nanoseconds
 from ahf_ros.nodes.process import ProcessNode
 
 PERIOD = 1.0

@@ -13,7 +13,7 @@ from std_msgs.msg import Header
 
 from ahf_ros import msg
 from ahf_ros.base.target import Identification
-from ahf_ros.interchange.target_messages import coded_target_array
+from ahf_ros.files.target_messages import coded_target_array
 from ahf_ros.msg import CodedTargetArray
 from ahf_ros.nodes.messages import image_message
 from ahf_ros.nodes.parameters import ParameterSettings

@@ -25,8 +25,8 @@ from sensor_msgs.msg import CompressedImage, Image
 from std_msgs.msg import Header
 
 from ahf_ros.base.text import printable
-from ahf_ros.interchange.image_messages import nanoseconds
-from ahf_ros.interchange.target_messages import DROPPED
+from ahf_ros.files.image_messages import nanoseconds
+from ahf_ros.files.target_messages import DROPPED
 from ahf_ros.msg import CodedTargetArray
 from ahf_ros.nodes.answers import Answers
 from ahf_ros.nodes.diagnostics import Tally, seconds

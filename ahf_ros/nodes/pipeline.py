@@ -15,8 +15,8 @@ from ahf_ros.base.target import Identification
 from ahf_ros.base.text import counted, listed
 from ahf_ros.detectors import Detector, create_detector
 from ahf_ros.detectors.contract import Unavailable
+from ahf_ros.files.target_messages import coded_target_array, unanswered
 from ahf_ros.filtering.homomorphic import filtered
-from ahf_ros.interchange.target_messages import coded_target_array, unanswered
 from ahf_ros.msg import CodedTargetArray
 from ahf_ros.nodes.settings import LOSSLESS, DetectorNodeSettings
 from ahf_ros.stream import Answer, Stream

@@ -18,9 +18,9 @@ from std_msgs.msg import Header
 
 from ahf_ros.base.target import UNDECODED, Target
 from ahf_ros.base.text import listed, printable
-from ahf_ros.interchange.camera_info import Calibration, places_with_covariances
-from ahf_ros.interchange.image_messages import nanoseconds
-from ahf_ros.interchange.target_messages import identification_from, is_answered
+from ahf_ros.files.camera_info import Calibration, places_with_covariances
+from ahf_ros.files.image_messages import nanoseconds
+from ahf_ros.files.target_messages import identification_from, is_answered
 from ahf_ros.msg import CodedTargetArray
 from ahf_ros.network.files.coordinate_files import read_coordinates
 from ahf_ros.network.points import blocks

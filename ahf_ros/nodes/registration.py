@@ -22,7 +22,7 @@ from ahf_ros.clouds.matching import ANSWER, ANSWERS, CLOUD, WAITING_MEMORY, Matc
 from ahf_ros.clouds.point_clouds import whole_points
 from ahf_ros.clouds.registration_files import ScanRecord, in_common_frame, write_registration
 from ahf_ros.clouds.scans import Scans, known_targets, scan_cloud
-from ahf_ros.interchange.image_messages import nanoseconds
+from ahf_ros.files.image_messages import nanoseconds
 from ahf_ros.nodes.diagnostics import publish_status, status_of
 from ahf_ros.nodes.inputs import Input
 from ahf_ros.nodes.messages import (

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from ahf_ros.evaluation import line
-from ahf_ros.interchange.image_messages import nanoseconds
-from ahf_ros.interchange.target_messages import identification_from, is_answered
+from ahf_ros.files.image_messages import nanoseconds
+from ahf_ros.files.target_messages import identification_from, is_answered
 from ahf_ros.msg import CodedTargetArray
 from ahf_ros.nodes.parameters import ParameterSettings
 from ahf_ros.nodes.process import ProcessNode

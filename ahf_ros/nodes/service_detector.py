@@ -17,7 +17,7 @@ from std_msgs.msg import Header
 from ahf_ros.base.target import Target
 from ahf_ros.base.target_check import checked_targets
 from ahf_ros.base.text import printable
-from ahf_ros.interchange.target_messages import identification_from
+from ahf_ros.files.target_messages import identification_from
 from ahf_ros.nodes.messages import image_message
 from ahf_ros.nodes.pipeline import Stopping
 from ahf_ros.srv import Identify

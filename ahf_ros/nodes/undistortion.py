@@ -14,9 +14,9 @@ from std_msgs.msg import Header
 
 from ahf_ros import msg
 from ahf_ros.base.target import Identification
-from ahf_ros.interchange.camera_info import Calibration, calibration, undistorted_targets
-from ahf_ros.interchange.image_messages import nanoseconds
-from ahf_ros.interchange.target_messages import coded_target_array
+from ahf_ros.files.camera_info import Calibration, calibration, undistorted_targets
+from ahf_ros.files.image_messages import nanoseconds
+from ahf_ros.files.target_messages import coded_target_array
 from ahf_ros.msg import CodedTargetArray
 from ahf_ros.nodes.diagnostics import Tally
 from ahf_ros.nodes.inputs import Input

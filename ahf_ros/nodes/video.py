@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from ahf_ros.interchange.video import VideoDecoder
+from ahf_ros.files.video import VideoDecoder
 from ahf_ros.nodes.image_queue import ImageQueue
 from ahf_ros.nodes.messages import image_message
 

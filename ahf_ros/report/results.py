@@ -12,8 +12,8 @@ from ahf_ros.base.opening import LARGEST, Most, file_errors, parsed_json, parsin
 from ahf_ros.base.target import UNDECODED, FilterState, SearchTrace, Target
 from ahf_ros.base.target_check import MAXIMUM_ID, checked_integer, checked_number
 from ahf_ros.base.text import shown
-from ahf_ros.interchange.files import RESULTS_FILE
-from ahf_ros.interchange.target_json import targets_from_json
+from ahf_ros.files.files import RESULTS_FILE
+from ahf_ros.files.target_json import targets_from_json
 
 _MAPPING = ('log_offset', 'black_percentile', 'white_percentile')
 _MAXIMUM_SIDE = 65536  # px
@@ -62,7 +62,7 @@ class ImageResult:
 def result_from_json(content: Any, source: Path, where: str) -> ImageResult:
     """Return the result that a JSON object of a file is; errors call the object `where`.
 
-    `ahf_ros.interchange.target_json.to_json` makes such objects; only 'image' and 'targets' are
+    `ahf_ros.files.target_json.to_json` makes such objects; only 'image' and 'targets' are
     required. A ValueError names a field that is not accepted.
 
     Examples

@@ -19,8 +19,8 @@ from std_srvs.srv import Trigger
 from test_bag_register import FAMILY, contents, picture, register, shot
 
 from ahf_ros.clouds.point_clouds import whole_points
-from ahf_ros.interchange.cloud_files import write_ply
-from ahf_ros.interchange.image_files import write_image
+from ahf_ros.files.cloud_files import write_ply
+from ahf_ros.files.image_files import write_image
 from support import bags
 from support.command_line import status
 from support.detector import overrides, own

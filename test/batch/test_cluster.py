@@ -27,7 +27,7 @@ from ahf_ros.batch import cluster
 from ahf_ros.batch.cluster import DaskEngine
 from ahf_ros.batch.engine import EngineLost, TaskFailed, finished_tasks
 from ahf_ros.cli import main
-from ahf_ros.interchange.image_files import write_image
+from ahf_ros.files.image_files import write_image
 from support import bags, environment
 from support.jobs import do_as_told
 

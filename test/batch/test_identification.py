@@ -15,7 +15,7 @@ from ahf_ros.base.settings.nested import updated
 from ahf_ros.batch import identification
 from ahf_ros.batch.identification import identify_images
 from ahf_ros.batch.task import ImageTask
-from ahf_ros.interchange.image_files import write_image
+from ahf_ros.files.image_files import write_image
 from ahf_ros.session_settings import IdentificationSettings
 from ahf_ros.synthetic.scene import SceneSettings, render
 

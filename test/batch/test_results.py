@@ -16,9 +16,9 @@ from ahf_ros.batch.identification import file_fingerprint
 from ahf_ros.batch.results import PREVIOUS, Results, Unwritable, kept_outcomes_in_order
 from ahf_ros.batch.task import ImageOutcome, ImageTask, Level, Message
 from ahf_ros.cli import main
-from ahf_ros.interchange.files import RESULTS_FILE
-from ahf_ros.interchange.image_files import write_image
-from ahf_ros.interchange.target_json import read_results
+from ahf_ros.files.files import RESULTS_FILE
+from ahf_ros.files.image_files import write_image
+from ahf_ros.files.target_json import read_results
 from ahf_ros.session_settings import IdentificationSettings
 from support.disk import room_for
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from ahf_ros.batch.watch import Arrivals
 from ahf_ros.cli import main
-from ahf_ros.interchange.files import RESULTS_FILE
+from ahf_ros.files.files import RESULTS_FILE
 
 ROOT = Path(__file__).resolve().parents[2]
 LIMIT = 300.0

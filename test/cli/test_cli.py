@@ -14,8 +14,8 @@ import numpy as np
 import pytest
 
 from ahf_ros.base.settings.nested import flat_parameters
-from ahf_ros.interchange.image_files import read_image, write_image
-from ahf_ros.interchange.truth_files import read_truth
+from ahf_ros.files.image_files import read_image, write_image
+from ahf_ros.files.truth_files import read_truth
 from ahf_ros.session_settings import IdentificationSettings
 from ahf_ros.synthetic.bent.settings import BentSettings
 from ahf_ros.synthetic.scene import SceneSettings

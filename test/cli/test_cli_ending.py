@@ -19,7 +19,7 @@ pytest.importorskip('rosbags', reason='rosbags is not installed')
 from ahf_ros.bag import run
 from ahf_ros.bag.definitions import typestore
 from ahf_ros.cli import main
-from ahf_ros.interchange.image_files import write_image
+from ahf_ros.files.image_files import write_image
 from support import ROOT, bags, environment, packages
 from support.command_line import status as status_of
 

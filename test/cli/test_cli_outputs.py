@@ -16,10 +16,10 @@ from ahf_ros.bag.definitions import IMAGE, typestore
 from ahf_ros.bag.registration import POINT_CLOUD
 from ahf_ros.cli import commands
 from ahf_ros.cli.options import input_files, input_name, input_path, output_path
-from ahf_ros.interchange.cloud_files import write_ply
-from ahf_ros.interchange.files import csv_table
-from ahf_ros.interchange.image_files import write_image
-from ahf_ros.interchange.truth_files import write_truth
+from ahf_ros.files.cloud_files import write_ply
+from ahf_ros.files.files import csv_table
+from ahf_ros.files.image_files import write_image
+from ahf_ros.files.truth_files import write_truth
 from ahf_ros.network.files.network_results import write_network
 from ahf_ros.prints.gsi import point_family, positions_of
 from ahf_ros.synthetic.scene import render

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from ahf_ros.cli.identify import stacked
-from ahf_ros.interchange.image_files import read_image, write_image
+from ahf_ros.files.image_files import read_image, write_image
 from support.command_line import status
 
 FAMILY = '--family=metashape12'

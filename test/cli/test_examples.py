@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from ahf_ros.interchange.truth_files import read_truth
+from ahf_ros.files.truth_files import read_truth
 from support import ROOT
 from support.command_line import status
 from support.photographs import PANEL, needs_photographs

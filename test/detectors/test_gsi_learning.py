@@ -9,7 +9,7 @@ import pytest
 
 from ahf_ros.cli import main
 from ahf_ros.detectors.learning.points import learn_family
-from ahf_ros.interchange.tables import read_points
+from ahf_ros.files.tables import read_points
 from ahf_ros.prints.gsi import point_family, positions_of
 from support import ROOT
 from support.photographs import IN_CI

@@ -13,7 +13,7 @@ import pytest
 from ahf_ros.detectors import DetectorSettings, create_detector
 from ahf_ros.detectors.learning.rings import LearntFamily, learn_families, likely_rules
 from ahf_ros.detectors.ring.bands import find_bands
-from ahf_ros.interchange.image_files import read_image, write_image
+from ahf_ros.files.image_files import read_image, write_image
 from ahf_ros.prints.cyclic import smallest_rotation
 from ahf_ros.prints.ring import conforming, family, ring_family
 from ahf_ros.synthetic.scene import Rendering, SceneSettings

@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 import pytest
 
-from ahf_ros.interchange.cloud_files import read_cloud
+from ahf_ros.files.cloud_files import read_cloud
 from ahf_ros.network.export.formats import NETWORK_FORMATS, write_network_export
 from ahf_ros.network.solution import Solution
 from support.networks import SIZE, solution

@@ -14,8 +14,8 @@ import numpy as np
 import pytest
 
 from ahf_ros.base.target import Identification, Target
-from ahf_ros.interchange.exif import FILM_DIAGONAL, Exif, read_exif
-from ahf_ros.interchange.target_json import to_json
+from ahf_ros.files.exif import FILM_DIAGONAL, Exif, read_exif
+from ahf_ros.files.target_json import to_json
 from ahf_ros.network.camera import project
 from ahf_ros.network.files.camera_files import opencv_yaml, read_camera, ros_yaml
 from ahf_ros.network.files.control_files import read_control, read_scale_bars

@@ -19,7 +19,7 @@ import cv2
 import numpy as np
 import pytest
 
-from ahf_ros.interchange.tables import read_points
+from ahf_ros.files.tables import read_points
 from ahf_ros.network.camera import project
 from ahf_ros.network.export.formats import network_remark, write_network_export
 from ahf_ros.network.solution import Solution

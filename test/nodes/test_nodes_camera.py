@@ -14,7 +14,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from sensor_msgs.msg import CameraInfo
 from std_msgs.msg import Header
 
-from ahf_ros.interchange.camera_info import calibration, undistorted
+from ahf_ros.files.camera_info import calibration, undistorted
 from ahf_ros.msg import CodedTargetArray
 from ahf_ros.nodes.illumination import camera_info
 from ahf_ros.nodes.messages import image_message

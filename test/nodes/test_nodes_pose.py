@@ -24,7 +24,7 @@ from sensor_msgs.msg import CameraInfo, Image
 from std_msgs.msg import Header
 
 from ahf_ros.base.target import Target
-from ahf_ros.interchange.camera_info import calibration, undistorted
+from ahf_ros.files.camera_info import calibration, undistorted
 from ahf_ros.msg import CodedTarget, CodedTargetArray
 from ahf_ros.network.camera import project
 from support.detector import overrides, own, values

@@ -26,7 +26,7 @@ from ahf_ros.clouds.point_clouds import (
     whole_points,
 )
 from ahf_ros.clouds.registration.scan import Scan
-from ahf_ros.interchange.cloud_files import read_cloud
+from ahf_ros.files.cloud_files import read_cloud
 from ahf_ros.network.camera import rotation_matrices
 from ahf_ros.network.files.coordinate_files import read_coordinates
 from ahf_ros.network.transform import Transform, rotation_vector

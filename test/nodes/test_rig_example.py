@@ -13,7 +13,7 @@ import rclpy
 from std_msgs.msg import Header
 
 from ahf_ros import SceneSettings, identify, msg, render
-from ahf_ros.interchange.target_messages import coded_target_array
+from ahf_ros.files.target_messages import coded_target_array
 from support import ROOT
 from support.live import Graph
 

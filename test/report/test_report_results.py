@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from ahf_ros.base.target import SquareMarker, TrueTarget
-from ahf_ros.interchange.image_files import find_image, read_image, write_image
+from ahf_ros.files.image_files import find_image, read_image, write_image
 from ahf_ros.report import images
 from ahf_ros.report.images import fitted, shown_image, thumbnail
 from ahf_ros.report.page import families_of, row

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from ahf_ros.cli import main
-from ahf_ros.interchange.truth_files import read_truth
+from ahf_ros.files.truth_files import read_truth
 from ahf_ros.prints.dots import dot_family
 from ahf_ros.prints.families import print_in
 from ahf_ros.prints.gsi import GSI_LIBRARY, point_family

@@ -31,7 +31,7 @@ from ahf_ros.base import ending
 from ahf_ros.base.target import Target, sorted_targets
 from ahf_ros.base.text import MAXIMUM_LENGTH, printable, reason_of
 from ahf_ros.detectors.contract import DetectorSettings, Unavailable
-from ahf_ros.interchange.target_json import targets_from_json
+from ahf_ros.files.target_json import targets_from_json
 from ahf_ros.vision.image import as_gray, check_image
 
 MAXIMUM_OUTPUT = 64 * 2**20

@@ -17,7 +17,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ahf_ros.interchange.files import csv_table
+from ahf_ros.files.files import csv_table
 from ahf_ros.network.camera import undistort
 from ahf_ros.network.export.adjusted import (
     Seen,

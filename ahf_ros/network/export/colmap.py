@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from ahf_ros.base.opening import file_errors
-from ahf_ros.interchange.files import csv_table
+from ahf_ros.files.files import csv_table
 from ahf_ros.network.export.adjusted import lens_of, numbers
 from ahf_ros.network.export.survey import Survey
 from ahf_ros.network.solution import Solution

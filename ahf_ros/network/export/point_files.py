@@ -14,8 +14,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ahf_ros.interchange.cloud_files import write_ply
-from ahf_ros.interchange.files import csv_table
+from ahf_ros.files.cloud_files import write_ply
+from ahf_ros.files.files import csv_table
 from ahf_ros.network.network import FloatArray
 from ahf_ros.network.points import MeasuredPoints, blocks, standard_deviations
 from ahf_ros.network.solution import Solution

@@ -17,7 +17,7 @@ from xml.etree.ElementTree import Element, SubElement, register_namespace
 
 import numpy as np
 
-from ahf_ros.interchange.files import csv_table
+from ahf_ros.files.files import csv_table
 from ahf_ros.network.export.adjusted import (
     determined,
     file_name,

@@ -15,8 +15,8 @@ from ahf_ros.base.opening import reader
 from ahf_ros.base.target import UNDECODED, Target
 from ahf_ros.base.target_check import checked_integer
 from ahf_ros.base.text import listed, shown
-from ahf_ros.interchange.files import checked_file_name
-from ahf_ros.interchange.target_json import json_lines, targets_from_json
+from ahf_ros.files.files import checked_file_name
+from ahf_ros.files.target_json import json_lines, targets_from_json
 
 _NAMED = 10  # labels in a message
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ahf_ros.interchange.files import csv_table
+from ahf_ros.files.files import csv_table
 from ahf_ros.network.export.survey import Mark, Survey
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from ahf_ros.base.opening import reader
-from ahf_ros.interchange.tables import POINT, Row, one_of, read_table
+from ahf_ros.files.tables import POINT, Row, one_of, read_table
 from ahf_ros.network.measurement import CalibratedLength
 from ahf_ros.network.network import ControlPoint, FloatArray, ScaleBar
 

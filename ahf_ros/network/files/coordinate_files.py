@@ -11,7 +11,7 @@ import numpy as np
 from ahf_ros.base.opening import Most, parsed_json, read_text, reader
 from ahf_ros.base.text import shown
 from ahf_ros.base.writing import complete
-from ahf_ros.interchange.tables import POINT, Row, read_table
+from ahf_ros.files.tables import POINT, Row, read_table
 from ahf_ros.network.files.control_files import control_points
 from ahf_ros.network.files.network_results import read_network
 from ahf_ros.network.network import ControlPoint

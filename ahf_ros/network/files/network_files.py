@@ -10,8 +10,8 @@ from pathlib import Path, PurePath
 import numpy as np
 
 from ahf_ros.base.text import counted
-from ahf_ros.interchange.exif import Exif
-from ahf_ros.interchange.tables import read_by_image
+from ahf_ros.files.exif import Exif
+from ahf_ros.files.tables import read_by_image
 from ahf_ros.network.files.camera_files import CameraFile
 from ahf_ros.network.files.observation_files import ImagePoint, ObservedPhotograph
 from ahf_ros.network.network import (

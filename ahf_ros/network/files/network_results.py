@@ -16,8 +16,8 @@ from ahf_ros.base.opening import LARGEST, Most, inside, parsed_json, read_text, 
 from ahf_ros.base.target_check import MAXIMUM_ID, checked_integer, checked_number
 from ahf_ros.base.text import shown
 from ahf_ros.base.writing import check_set, complete, write_set
-from ahf_ros.interchange.arrays import read_arrays
-from ahf_ros.interchange.files import csv_table
+from ahf_ros.files.arrays import read_arrays
+from ahf_ros.files.files import csv_table
 from ahf_ros.network.camera import EQUIDISTANT, PARAMETERS, parameters_of
 from ahf_ros.network.deviations import bar_deviations, control_deviations
 from ahf_ros.network.files.camera_files import FISHEYE, opencv_yaml, ros_yaml

@@ -13,9 +13,9 @@ from ahf_ros.base.opening import reader
 from ahf_ros.base.target import UNDECODED
 from ahf_ros.base.target_check import MAXIMUM_LENGTH_PX
 from ahf_ros.base.text import shown
-from ahf_ros.interchange.files import checked_file_name
-from ahf_ros.interchange.tables import Row, one_of, read_table
-from ahf_ros.interchange.target_json import json_lines
+from ahf_ros.files.files import checked_file_name
+from ahf_ros.files.tables import Row, one_of, read_table
+from ahf_ros.files.target_json import json_lines
 from ahf_ros.network.export.survey import MAXIMUM_SIDE, measured_image
 from ahf_ros.network.network import FloatArray
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ahf_ros.base.opening import reader
-from ahf_ros.interchange.tables import Row, one_of, read_by_image, read_table
+from ahf_ros.files.tables import Row, one_of, read_by_image, read_table
 from ahf_ros.network.camera import rotation_matrices
 from ahf_ros.network.network import FloatArray
 from ahf_ros.network.transform import Transform, rotation_vector

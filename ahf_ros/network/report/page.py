@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ahf_ros.interchange.html_pages import page_script, page_style, page_template, script_json
+from ahf_ros.files.html_pages import page_script, page_style, page_template, script_json
 from ahf_ros.network.camera import parameters_of
 from ahf_ros.network.points import correlations, standard_deviations
 from ahf_ros.network.report.figures import enlargement, image_figure, sensor_map, views

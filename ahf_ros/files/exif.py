@@ -11,8 +11,8 @@ from typing import Any
 
 from ahf_ros.base.extras import need
 from ahf_ros.base.opening import Most, opened, reader
-from ahf_ros.interchange.headers import read_header
-from ahf_ros.interchange.heic import register_heic
+from ahf_ros.files.headers import read_header
+from ahf_ros.files.heic import register_heic
 
 FILM_DIAGONAL = math.hypot(36, 24)
 """Diagonal of a film frame, mm, which equivalent focal lengths refer to (CIPA DCG-001)."""

@@ -16,8 +16,8 @@ import cv2
 import numpy as np
 
 from ahf_ros.base.text import printable
-from ahf_ros.interchange.png import is_png, png_chunks
-from ahf_ros.interchange.tiff import first_directory, is_tiff
+from ahf_ros.files.png import is_png, png_chunks
+from ahf_ros.files.tiff import first_directory, is_tiff
 
 _JPEG = b'\xff\xd8'
 _END, _SCAN = 0xD9, 0xDA  # markers of JPEG

@@ -13,8 +13,8 @@ import struct
 from contextlib import suppress
 from dataclasses import dataclass
 
-from ahf_ros.interchange.png import is_png, png_chunks
-from ahf_ros.interchange.tiff import Field, directories, first_at, first_directory, is_tiff
+from ahf_ros.files.png import is_png, png_chunks
+from ahf_ros.files.tiff import Field, directories, first_at, first_directory, is_tiff
 
 UPRIGHT = 1
 """Orientation of an image whose first row is the upper one and whose first column is the left."""

@@ -16,7 +16,7 @@ import fsspec
 
 from ahf_ros.batch.identification import file_fingerprint
 from ahf_ros.cli.identify import image_paths
-from ahf_ros.interchange.image_files import read_image, write_image
+from ahf_ros.files.image_files import read_image, write_image
 
 IMAGE = np.arange(400, dtype=np.uint8).reshape(20, 20)
 

@@ -12,10 +12,10 @@ import pytest
 
 from ahf_ros.base.target import TrueTarget
 from ahf_ros.base.writing import write_whole
-from ahf_ros.interchange.files import csv_table
-from ahf_ros.interchange.image_files import write_image
-from ahf_ros.interchange.tables import read_table
-from ahf_ros.interchange.truth_files import write_truth
+from ahf_ros.files.files import csv_table
+from ahf_ros.files.image_files import write_image
+from ahf_ros.files.tables import read_table
+from ahf_ros.files.truth_files import write_truth
 from support.disk import room_for
 
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ahf_ros.interchange.cloud_files import read_cloud, write_pcd, write_ply
+from ahf_ros.files.cloud_files import read_cloud, write_pcd, write_ply
 
 WRITERS = {'.ply': write_ply, '.pcd': write_pcd}
 

@@ -17,7 +17,7 @@ import numpy as np
 
 from ahf_ros.base.opening import LARGEST, Most, read_text, reader
 from ahf_ros.base.text import shown
-from ahf_ros.interchange.files import csv_text
+from ahf_ros.files.files import csv_text
 
 POINT = ('id', 'x', 'y', 'z')
 """Columns of a table of points, and what lists without a header have in this order."""

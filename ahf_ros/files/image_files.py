@@ -15,9 +15,9 @@ from ahf_ros.base.extras import missing
 from ahf_ros.base.inputs import register_input
 from ahf_ros.base.opening import Most, read_bytes, reader
 from ahf_ros.base.writing import write_whole
-from ahf_ros.interchange.headers import HEIC, UPRIGHT, read_header
-from ahf_ros.interchange.heic import ENDINGS, decoded_heic
-from ahf_ros.interchange.whole import decoded
+from ahf_ros.files.headers import HEIC, UPRIGHT, read_header
+from ahf_ros.files.heic import ENDINGS, decoded_heic
+from ahf_ros.files.whole import decoded
 from ahf_ros.vision.image import as_oriented, check_size, without_gaps
 
 SUFFIXES = ('.bmp', '.jpeg', '.jpg', '.png', '.tif', '.tiff')

@@ -20,7 +20,7 @@ from ahf_ros.base.target_check import (
     checked_text,
 )
 from ahf_ros.base.text import reason_of, shown
-from ahf_ros.interchange.files import RESULTS_FILE, checked_file_name
+from ahf_ros.files.files import RESULTS_FILE, checked_file_name
 
 _NAMES = [it.name for it in fields(Target)]
 _ABSENT = {'id': None, 'x': None, 'y': None, 'code': 0, 'semi_major': 0.0, 'semi_minor': 0.0}

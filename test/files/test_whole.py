@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 import pytest
 
-from ahf_ros.interchange.whole import damage, decoded
+from ahf_ros.files.whole import damage, decoded
 
 NOISE = np.random.default_rng(0).integers(0, 255, (240, 320), np.uint8)
 SMOOTH = cv2.GaussianBlur(NOISE, (0, 0), 3)

@@ -16,7 +16,7 @@ import cv2
 import numpy as np
 
 from ahf_ros.base.text import shown
-from ahf_ros.interchange.image_files import NotedImage, decode_bytes
+from ahf_ros.files.image_files import NotedImage, decode_bytes
 from ahf_ros.vision.image import check_size, without_gaps
 
 

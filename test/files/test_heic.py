@@ -11,8 +11,8 @@ import cv2
 import numpy as np
 import pytest
 
-from ahf_ros.interchange.exif import read_exif
-from ahf_ros.interchange.image_files import decode_bytes, read_image, read_noted_image
+from ahf_ros.files.exif import read_exif
+from ahf_ros.files.image_files import decode_bytes, read_image, read_noted_image
 from ahf_ros.vision.image import check_size
 from support.command_line import status
 from support.scenes import rendering

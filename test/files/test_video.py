@@ -14,7 +14,7 @@ pytest.importorskip('av', reason='PyAV is not installed')
 
 import av
 
-from ahf_ros.interchange.video import VideoDecoder, codec_of
+from ahf_ros.files.video import VideoDecoder, codec_of
 from ahf_ros.session import identify
 from ahf_ros.synthetic.scene import SceneSettings, render
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from ahf_ros.base.target import TrueTarget
-from ahf_ros.interchange.truth_files import read_truth, write_truth
+from ahf_ros.files.truth_files import read_truth, write_truth
 
 
 def test_truth_that_is_written_is_read(tmp_path):

@@ -14,9 +14,9 @@ import pytest
 from ahf_ros.base.extras import missing
 from ahf_ros.cli import main
 from ahf_ros.cli.identify import image_paths
-from ahf_ros.interchange.exif import read_exif
-from ahf_ros.interchange.headers import read_header
-from ahf_ros.interchange.image_files import (
+from ahf_ros.files.exif import read_exif
+from ahf_ros.files.headers import read_header
+from ahf_ros.files.image_files import (
     decode_bytes,
     read_image,
     read_noted_image,

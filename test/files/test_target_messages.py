@@ -10,7 +10,7 @@ from std_msgs.msg import Header
 
 from ahf_ros import msg
 from ahf_ros.base.target import UNDECODED, FilterState, Identification, SquareMarker, Target
-from ahf_ros.interchange.target_messages import (
+from ahf_ros.files.target_messages import (
     coded_target_array,
     identification_from,
     is_answered,

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from ahf_ros.base.target import Target
-from ahf_ros.interchange.camera_info import (
+from ahf_ros.files.camera_info import (
     Calibration,
     calibration,
     undistorted,

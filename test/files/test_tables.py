@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ahf_ros.interchange.tables import POINT, read_points, read_table
+from ahf_ros.files.tables import POINT, read_points, read_table
 from ahf_ros.network.files.control_files import read_control
 
 UTM = {'1': [500329.1159, 5452818.8311, 1000.3608], '5': [-0.5, 2.0, 0.03]}

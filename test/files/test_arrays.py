@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ahf_ros.interchange.arrays import read_arrays
+from ahf_ros.files.arrays import read_arrays
 
 EXPECTED = {'ids': ('U', (2,)), 'values': ('f', (2, 3))}
 

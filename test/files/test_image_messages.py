@@ -16,7 +16,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ahf_ros.detectors import create_detector
-from ahf_ros.interchange.image_messages import (
+from ahf_ros.files.image_messages import (
     ENCODINGS,
     WITH_PLANES,
     decode_compressed,

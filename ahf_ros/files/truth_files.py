@@ -8,8 +8,8 @@ from ahf_ros.base.opening import reader
 from ahf_ros.base.target import UNDECODED, TrueTarget, Truth
 from ahf_ros.base.target_check import MAXIMUM_ID, MAXIMUM_LENGTH_PX
 from ahf_ros.base.writing import write_whole
-from ahf_ros.interchange.files import checked_file_name, csv_table
-from ahf_ros.interchange.tables import Row, read_table
+from ahf_ros.files.files import checked_file_name, csv_table
+from ahf_ros.files.tables import Row, read_table
 
 
 @reader('a table of true targets in CSV')

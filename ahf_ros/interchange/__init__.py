@@ -1,1 +1,0 @@
-"""Files, messages, clouds and JSON."""
