@@ -20,7 +20,7 @@ _MODULES = {
     'IdentificationSettings': 'session_settings',
     'Identifier': 'filtering.identifier',
     'ImageStack': 'vision.stack',
-    'SceneSettings': 'synthetic.scene',
+    'SceneSettings': 'scenes.scene',
     'SearchTrace': 'base.target',
     'SquareMarker': 'base.target',
     'Target': 'base.target',
@@ -34,9 +34,9 @@ _MODULES = {
     'identify': 'session',
     'orient': 'network.orient',
     'read_image': 'files.image_files',
-    'render': 'synthetic.scene',
+    'render': 'scenes.scene',
     'resect': 'network.single_image',
-    'score': 'evaluation',
+    'score': 'scenes.evaluation',
     'write_image': 'files.image_files',
 }
 
@@ -56,7 +56,6 @@ if TYPE_CHECKING:  # which takes what is imported `as` itself for public
     from ahf_ros.detectors import DetectorSettings as DetectorSettings
     from ahf_ros.detectors import create_detector as create_detector
     from ahf_ros.drawing.overlay import draw as draw
-    from ahf_ros.evaluation import score as score
     from ahf_ros.files.image_files import read_image as read_image
     from ahf_ros.files.image_files import write_image as write_image
     from ahf_ros.filtering.identifier import Identifier as Identifier
@@ -65,11 +64,12 @@ if TYPE_CHECKING:  # which takes what is imported `as` itself for public
     from ahf_ros.network.congruence import compare as compare
     from ahf_ros.network.orient import orient as orient
     from ahf_ros.network.single_image import resect as resect
+    from ahf_ros.scenes.evaluation import score as score
+    from ahf_ros.scenes.scene import SceneSettings as SceneSettings
+    from ahf_ros.scenes.scene import render as render
     from ahf_ros.session import create_identifier as create_identifier
     from ahf_ros.session import identify as identify
     from ahf_ros.session_settings import IdentificationSettings as IdentificationSettings
-    from ahf_ros.synthetic.scene import SceneSettings as SceneSettings
-    from ahf_ros.synthetic.scene import render as render
     from ahf_ros.vision.stack import ImageStack as ImageStack
 else:
     __all__ = list(_MODULES)

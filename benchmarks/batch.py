@@ -24,7 +24,7 @@ from pathlib import Path
 import numpy as np
 
 from ahf_ros.files.image_files import write_image
-from ahf_ros.synthetic.scene import SceneSettings, render
+from ahf_ros.scenes.scene import SceneSettings, render
 from benchmarks.report import number, table
 from support.process_tree import ProcessTree
 

@@ -24,9 +24,9 @@ from typing import Any
 import numpy as np
 
 from ahf_ros.detectors import DETECTOR_NAMES
-from ahf_ros.evaluation import total
 from ahf_ros.prints.families import FAMILY_NAMES
-from ahf_ros.synthetic.bent.picture import render_bent
+from ahf_ros.scenes.bent.picture import render_bent
+from ahf_ros.scenes.evaluation import total
 from benchmarks import report
 from benchmarks.report import number
 from benchmarks.rows import Case, Scene, Seen, detector, measured

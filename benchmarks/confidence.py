@@ -39,7 +39,7 @@ from ahf_ros.detectors.ring.hypotheses import Hypotheses
 from ahf_ros.prints.dots import dot_family
 from ahf_ros.prints.gsi import point_family
 from ahf_ros.prints.ring import Family, canonical
-from ahf_ros.synthetic.scene import Rendering, render
+from ahf_ros.scenes.scene import Rendering, render
 from ahf_ros.vision.image import as_gray
 from ahf_ros.vision.pyramid import image_pyramid
 from benchmarks import report

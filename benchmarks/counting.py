@@ -19,8 +19,8 @@ import numpy as np
 from ahf_ros.detectors.contract import DetectorSettings
 from ahf_ros.detectors.ring.counting import estimate_count
 from ahf_ros.detectors.ring.detector import RingDetector
-from ahf_ros.synthetic.patterns import benchmark_lights
-from ahf_ros.synthetic.scene import SceneSettings, render
+from ahf_ros.scenes.patterns import benchmark_lights
+from ahf_ros.scenes.scene import SceneSettings, render
 from benchmarks import report
 from benchmarks.report import number, table
 

@@ -23,12 +23,12 @@ import numpy as np
 from ahf_ros.base.target import Target, TrueTarget
 from ahf_ros.detectors import DetectorSettings, create_detector
 from ahf_ros.detectors.contract import Detector, Expecting
-from ahf_ros.evaluation import FALSE, RIGHT, WRONG, judge
 from ahf_ros.files.image_files import read_image
 from ahf_ros.files.truth_files import read_truth
 from ahf_ros.prints import RING_NAMES
 from ahf_ros.prints.families import AUTO, KINDS
 from ahf_ros.prints.ring import FAMILY_NAMES, family
+from ahf_ros.scenes.evaluation import FALSE, RIGHT, WRONG, judge
 from benchmarks import report
 from benchmarks.report import FIRST_TEST_SEED, progress, table
 from support import PHOTOS

@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from ahf_ros.detectors import create_detector
-from ahf_ros.synthetic.scene import SceneSettings, render
+from ahf_ros.scenes.scene import SceneSettings, render
 from benchmarks import report
 from benchmarks.confidence import reliability
 from benchmarks.report import number, table

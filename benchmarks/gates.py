@@ -36,7 +36,7 @@ from ruamel.yaml import YAML
 
 from ahf_ros.files.truth_files import read_truth
 from ahf_ros.prints.families import KINDS
-from ahf_ros.synthetic.scene import SceneSettings, render
+from ahf_ros.scenes.scene import SceneSettings, render
 from benchmarks import report
 from benchmarks.changed import Shown, assigned, definitions
 from support import PHOTOS, ROOT, environment

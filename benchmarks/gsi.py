@@ -20,9 +20,9 @@ from pathlib import Path
 from typing import Any
 
 from ahf_ros.detectors import create_detector
-from ahf_ros.evaluation import score
 from ahf_ros.files.image_files import read_image
-from ahf_ros.synthetic.scene import SceneSettings, render
+from ahf_ros.scenes.evaluation import score
+from ahf_ros.scenes.scene import SceneSettings, render
 from benchmarks import report
 from benchmarks.report import number, table
 from benchmarks.rows import Case, Row, Scene, detector, measured, rendered

@@ -28,8 +28,8 @@ from ahf_ros.detectors import DETECTOR_NAMES, DetectorSettings, create_detector
 from ahf_ros.files.image_files import read_image
 from ahf_ros.files.truth_files import read_truth
 from ahf_ros.prints.ring import FAMILY_NAMES
-from ahf_ros.synthetic.patterns import LIGHT_NAMES, benchmark_lights
-from ahf_ros.synthetic.scene import SceneSettings
+from ahf_ros.scenes.patterns import LIGHT_NAMES, benchmark_lights
+from ahf_ros.scenes.scene import SceneSettings
 from benchmarks import comparison, report
 from benchmarks.report import number
 from benchmarks.rows import Case, Identify, Row, Seen, detector, measured, rendered

@@ -34,7 +34,7 @@ from std_msgs.msg import Header
 from ahf_ros.msg import CodedTargetArray
 from ahf_ros.nodes.messages import image_message
 from ahf_ros.nodes.settings import LATEST, LOSSLESS
-from ahf_ros.synthetic.scene import SceneSettings, render
+from ahf_ros.scenes.scene import SceneSettings, render
 from benchmarks import report
 from support import live
 

@@ -26,8 +26,8 @@ from typing import Any
 
 from ahf_ros.detectors import DETECTOR_NAMES
 from ahf_ros.prints.families import FAMILY_NAMES
-from ahf_ros.synthetic.patterns import LIGHT_NAMES
-from ahf_ros.synthetic.scene import SceneSettings, render
+from ahf_ros.scenes.patterns import LIGHT_NAMES
+from ahf_ros.scenes.scene import SceneSettings, render
 from benchmarks import report
 from benchmarks.report import number
 from benchmarks.rows import Case, Scene, detector, measured

@@ -25,11 +25,11 @@ import numpy as np
 
 from ahf_ros.detectors import create_detector
 from ahf_ros.detectors.ring.confidence import confidence
-from ahf_ros.evaluation import RIGHT, judge
 from ahf_ros.prints import RING_NAMES
 from ahf_ros.prints.families import FAMILY_NAMES, print_in
-from ahf_ros.synthetic.bent.picture import render_bent
-from ahf_ros.synthetic.scene import SceneSettings, render
+from ahf_ros.scenes.bent.picture import render_bent
+from ahf_ros.scenes.evaluation import RIGHT, judge
+from ahf_ros.scenes.scene import SceneSettings, render
 from benchmarks import report
 from benchmarks.confidence import readings_of
 from support.pictures.bent import DOT_SHARES, HEIGHT, LIGHTS, WIDTH, settings

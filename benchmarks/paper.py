@@ -31,7 +31,6 @@ import numpy as np
 
 from ahf_ros.base.target import Identification
 from ahf_ros.detectors import Drafter, Refiner, create_detector
-from ahf_ros.evaluation import Score, score, total
 from ahf_ros.filtering.identifier import Identifier
 from ahf_ros.filtering.settings import (
     EXTENDED,
@@ -40,8 +39,9 @@ from ahf_ros.filtering.settings import (
     GeneticSettings,
     TuningSettings,
 )
-from ahf_ros.synthetic.patterns import LIGHT_NAMES
-from ahf_ros.synthetic.scene import Rendering, SceneSettings, render
+from ahf_ros.scenes.evaluation import Score, score, total
+from ahf_ros.scenes.patterns import LIGHT_NAMES
+from ahf_ros.scenes.scene import Rendering, SceneSettings, render
 from benchmarks import report
 from benchmarks.report import number, table
 from support.preprocessors import PREPROCESSORS

@@ -24,8 +24,8 @@ import numpy as np
 
 from ahf_ros import FAMILY_NAMES, identify
 from ahf_ros.base.target import Target
-from ahf_ros.evaluation import RIGHT, judge, score
 from ahf_ros.prints.families import AUTO
+from ahf_ros.scenes.evaluation import RIGHT, judge, score
 from benchmarks import report
 from support.strangers import TRUTH, Photograph, photographs, picture, targets_of
 

@@ -13,8 +13,8 @@ from functools import partial
 from pathlib import Path
 
 from ahf_ros import FAMILY_NAMES
-from ahf_ros.evaluation import total
 from ahf_ros.prints.families import KINDS
+from ahf_ros.scenes.evaluation import total
 from benchmarks.report import number, table
 from benchmarks.speed import seconds
 from support.printed import identified, largest_error, sample, settings_of

@@ -20,8 +20,8 @@ import numpy as np
 from ahf_ros.detectors import DetectorSettings, create_detector
 from ahf_ros.detectors.learning.rings import LearntFamily, learn_families
 from ahf_ros.detectors.ring.bands import find_bands
-from ahf_ros.evaluation import Score, score, total
 from ahf_ros.prints.ring import Family, conforming, ring_family
+from ahf_ros.scenes.evaluation import Score, score, total
 from benchmarks import report
 from benchmarks.report import table
 from support.pictures.drawn_families import LIGHTS, TARGETS, random_family, sheet

@@ -28,7 +28,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ahf_ros.synthetic.scene import SceneSettings, render
+from ahf_ros.scenes.scene import SceneSettings, render
 from benchmarks.changed import assigned
 from benchmarks.gates import PACKAGE, Gate, Picture, seen
 from benchmarks.gates import written as written_pictures

@@ -17,7 +17,7 @@ from itertools import product
 from typing import Any
 
 from ahf_ros.detectors import create_detector
-from ahf_ros.evaluation import RIGHT, judge, score
+from ahf_ros.scenes.evaluation import RIGHT, judge, score
 from benchmarks import report
 from benchmarks.report import FIRST_TEST_SEED, number
 from support.collage import collage

@@ -24,8 +24,8 @@ import cv2
 import numpy as np
 from scipy.optimize import least_squares
 
-from ahf_ros.evaluation import score
-from ahf_ros.synthetic.scene import SceneSettings, render
+from ahf_ros.scenes.evaluation import score
+from ahf_ros.scenes.scene import SceneSettings, render
 from benchmarks import report
 from benchmarks.report import number
 from support.square_readers import FAMILY, readers

@@ -9,7 +9,7 @@ from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 
 from ahf_ros.nodes.launching import config, declared, default_argument
-from ahf_ros.synthetic.patterns import LIGHT_NAMES
+from ahf_ros.scenes.patterns import LIGHT_NAMES
 
 PARAMETERS = {
     'illumination': [

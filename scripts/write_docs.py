@@ -16,7 +16,7 @@ from ahf_ros.base.settings.parameter import Parameter
 from ahf_ros.nodes.drivers import DRIVERS
 from ahf_ros.nodes.interfaces import NODES
 from ahf_ros.nodes.settings import DetectorNodeSettings, PoseNodeSettings
-from ahf_ros.synthetic.patterns import LIGHT_NAMES
+from ahf_ros.scenes.patterns import LIGHT_NAMES
 from benchmarks.disturbances import TABLES, Count, markdown
 
 ROOT = Path(__file__).resolve().parent.parent

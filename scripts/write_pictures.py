@@ -34,7 +34,7 @@ from ahf_ros.prints.families import print_in
 from ahf_ros.prints.printing.drawing import Drawing, Ink
 from ahf_ros.prints.printing.files import svg_bytes
 from ahf_ros.prints.ring import canonical, family
-from ahf_ros.synthetic.patterns import LIGHT_NAMES
+from ahf_ros.scenes.patterns import LIGHT_NAMES
 from ahf_ros.vision.circle_fit import fit_dots
 from ahf_ros.vision.dot_search import voted_dots, whole_dots
 from ahf_ros.vision.frame import circle_outlines, project

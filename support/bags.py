@@ -14,7 +14,7 @@ from rosbags.typesys.store import Typestore
 
 from ahf_ros.bag.definitions import CODED_TARGETS, COMPRESSED_IMAGE, IMAGE, typestore
 from ahf_ros.bag.registration import POINT_CLOUD
-from ahf_ros.synthetic.scene import SceneSettings, render
+from ahf_ros.scenes.scene import SceneSettings, render
 
 STRING = 'std_msgs/msg/String'
 SCENE: dict[str, Any] = {

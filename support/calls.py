@@ -22,7 +22,7 @@ import numpy as np
 
 import ahf_ros
 from ahf_ros import create_identifier
-from ahf_ros.synthetic.scene import SceneSettings, render
+from ahf_ros.scenes.scene import SceneSettings, render
 from support import ROOT
 
 RECORD = ROOT / 'test' / 'calls.json'

@@ -11,8 +11,8 @@ import numpy as np
 
 from ahf_ros.base.target import TrueTarget
 from ahf_ros.prints.families import print_in
-from ahf_ros.synthetic.layout import quiet_radius
-from ahf_ros.synthetic.scene import SceneSettings, render
+from ahf_ros.scenes.layout import quiet_radius
+from ahf_ros.scenes.scene import SceneSettings, render
 
 _FOCAL_LENGTH = 6.0  # of the scenes, in their width
 

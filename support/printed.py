@@ -11,12 +11,12 @@ import numpy as np
 
 from ahf_ros import DetectorSettings, create_detector
 from ahf_ros.base.target import TrueTarget
-from ahf_ros.evaluation import Score, score, total
 from ahf_ros.prints.families import KINDS, print_in
 from ahf_ros.prints.printing.drawing import Drawing
 from ahf_ros.prints.printing.files import pdf_bytes
 from ahf_ros.prints.printing.settings import SheetSettings
 from ahf_ros.prints.printing.sheets import Sheets
+from ahf_ros.scenes.evaluation import Score, score, total
 
 SCALE = 8.0
 """Pixels of a rendered page in a millimetre."""

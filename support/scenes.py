@@ -10,8 +10,8 @@ import numpy as np
 
 from ahf_ros.base.target import Target
 from ahf_ros.detectors import create_detector
-from ahf_ros.evaluation import Score, score
-from ahf_ros.synthetic.scene import Rendering, SceneSettings, render
+from ahf_ros.scenes.evaluation import Score, score
+from ahf_ros.scenes.scene import Rendering, SceneSettings, render
 
 SMALL = SceneSettings(width=700, height=500, targets=6, dot_radius=18.0, seed=5)
 

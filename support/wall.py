@@ -7,8 +7,8 @@ import math
 import numpy as np
 
 from ahf_ros.network.camera import rotation_matrices
-from ahf_ros.synthetic.camera import tilted_camera
-from ahf_ros.synthetic.scene import SceneSettings
+from ahf_ros.scenes.camera import tilted_camera
+from ahf_ros.scenes.scene import SceneSettings
 
 SCENE = SceneSettings(width=640, height=480, targets=6, dot_radius=10.0, tilt=30.0, seed=3)
 TURN = rotation_matrices(np.array([[0.1, -0.2, 0.3]]))[0]

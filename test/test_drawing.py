@@ -27,7 +27,7 @@ from ahf_ros.drawing.overlay import (
     summary,
 )
 from ahf_ros.drawing.tiles import Tile, side_by_side
-from ahf_ros.synthetic.scene import SceneSettings
+from ahf_ros.scenes.scene import SceneSettings
 from support.scenes import rendered
 
 GRAY = np.full((240, 320), 120, np.uint8)

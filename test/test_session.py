@@ -12,9 +12,9 @@ from ahf_ros.base.target import Target
 from ahf_ros.detectors import DetectorSettings, create_detector
 from ahf_ros.filtering.settings import AdaptiveSettings
 from ahf_ros.nodes.settings import DetectorNodeSettings
+from ahf_ros.scenes.scene import SceneSettings
 from ahf_ros.session import create_identifier, identify
 from ahf_ros.session_settings import IdentificationSettings
-from ahf_ros.synthetic.scene import SceneSettings
 from support.scenes import rendered
 from support.square_markers import needs_square_markers
 

@@ -9,6 +9,7 @@ import pytest
 
 from ahf_ros.detectors import create_detector
 from ahf_ros.detectors.contract import DetectorSettings, Unavailable
+from ahf_ros.scenes.scene import SceneSettings, render
 from ahf_ros.session import create_identifier
 from ahf_ros.session_settings import IdentificationSettings
 from ahf_ros.stream import (
@@ -23,7 +24,6 @@ from ahf_ros.stream import (
     identify_parts,
     unmoved_parts,
 )
-from ahf_ros.synthetic.scene import SceneSettings, render
 
 SCENE = SceneSettings(
     width=480, height=360, targets=4, dot_radius=12, light='stripe', ambient=0.02, phases=4, seed=2

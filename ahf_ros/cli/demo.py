@@ -20,12 +20,12 @@ from ahf_ros.drawing.overlay import (
     overlay,
 )
 from ahf_ros.drawing.tiles import Tile, side_by_side
-from ahf_ros.evaluation import FALSE, RIGHT, WRONG, judge, line, method
 from ahf_ros.files.image_files import write_image
 from ahf_ros.filtering.homomorphic import filtered
+from ahf_ros.scenes.evaluation import FALSE, RIGHT, WRONG, judge, line, method
+from ahf_ros.scenes.patterns import LIGHT_NAMES
+from ahf_ros.scenes.scene import SceneSettings, render
 from ahf_ros.session import create_identifier
-from ahf_ros.synthetic.patterns import LIGHT_NAMES
-from ahf_ros.synthetic.scene import SceneSettings, render
 
 WAYS: dict[str, dict[str, Any]] = {
     'traditional': {'detector': 'traditional', 'ahf': False},

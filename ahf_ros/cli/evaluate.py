@@ -11,9 +11,9 @@ from ahf_ros.base.settings.parameter import Parameter
 from ahf_ros.base.text import printable
 from ahf_ros.cli import tell
 from ahf_ros.cli.options import add_option, input_name
-from ahf_ros.evaluation import TOLERANCE, Score, evaluate, table, total
 from ahf_ros.files.target_json import read_results
 from ahf_ros.files.truth_files import read_truth
+from ahf_ros.scenes.evaluation import TOLERANCE, Score, evaluate, table, total
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -16,9 +16,9 @@ from ahf_ros.cli import say, tell
 from ahf_ros.cli.options import add_option, output_path, settings_from
 from ahf_ros.files.image_files import write_image
 from ahf_ros.files.truth_files import read_truth, write_truth
-from ahf_ros.synthetic.bent.picture import BentRendering, render_bent
-from ahf_ros.synthetic.bent.settings import BentSettings
-from ahf_ros.synthetic.scene import Rendering, SceneSettings, render
+from ahf_ros.scenes.bent.picture import BentRendering, render_bent
+from ahf_ros.scenes.bent.settings import BentSettings
+from ahf_ros.scenes.scene import Rendering, SceneSettings, render
 
 _MAKERS: dict[str, type[SceneSettings | BentSettings]] = {
     'wall': SceneSettings,

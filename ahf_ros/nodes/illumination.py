@@ -19,7 +19,7 @@ from ahf_ros.nodes.messages import image_message
 from ahf_ros.nodes.parameters import ParameterSettings
 from ahf_ros.nodes.process import ProcessNode
 from ahf_ros.nodes.settings import IlluminationNodeSettings
-from ahf_ros.synthetic.scene import Rendering, SceneSettings, render
+from ahf_ros.scenes.scene import Rendering, SceneSettings, render
 
 
 class SceneMessages(NamedTuple):

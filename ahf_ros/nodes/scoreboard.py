@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from ahf_ros.evaluation import line
 from ahf_ros.files.image_messages import nanoseconds
 from ahf_ros.files.target_messages import identification_from, is_answered
 from ahf_ros.msg import CodedTargetArray
 from ahf_ros.nodes.parameters import ParameterSettings
 from ahf_ros.nodes.process import ProcessNode
 from ahf_ros.nodes.settings import ScoreboardSettings
+from ahf_ros.scenes.evaluation import line
 
 KEPT = 1000
 """Number of truths that wait for the answer to their image."""

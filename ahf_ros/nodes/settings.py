@@ -15,9 +15,9 @@ from ahf_ros.clouds.registration_settings import RegistrationSettings, check_fra
 from ahf_ros.detectors import DETECTOR, detector_name
 from ahf_ros.nodes.patience import CONTINUOUS, TRIGGERED, UNKNOWN
 from ahf_ros.prints.families import prints_of
+from ahf_ros.scenes.scene import SceneSettings
 from ahf_ros.session import create_identifier
 from ahf_ros.session_settings import IdentificationSettings, StackSettings
-from ahf_ros.synthetic.scene import SceneSettings
 
 LATEST, LOSSLESS = 'latest', 'lossless'
 """What becomes of images that arrive while another one is being identified."""

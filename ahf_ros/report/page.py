@@ -35,11 +35,11 @@ from ahf_ros.base.target import (
 from ahf_ros.base.text import printable, reason_of
 from ahf_ros.base.writing import whole_file
 from ahf_ros.detectors.contract import DetectorSettings
-from ahf_ros.evaluation import FALSE, RIGHT, WRONG, judge
 from ahf_ros.files.html_pages import page_script, page_style, page_template, script_json
 from ahf_ros.prints.families import AUTO, prints_in
 from ahf_ros.report.images import Picture, fitted, shown_image, thumbnail
 from ahf_ros.report.results import ImageResult
+from ahf_ros.scenes.evaluation import FALSE, RIGHT, WRONG, judge
 
 _PAGE = Path(__file__).parent / 'page'  # the template, and the styles and scripts that it holds
 _SCRIPTS = ('data', 'table', 'viewer', 'plots', 'details', 'overview', 'main')  # in their order

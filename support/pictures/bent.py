@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ahf_ros.synthetic.bent.settings import BentSettings
+from ahf_ros.scenes.bent.settings import BentSettings
 
 DOT_SHARES = {'gsi': 0.5, 'dots': 0.7}
 """Radius of the dot over that of a ring target of about the same size."""

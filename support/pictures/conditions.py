@@ -20,9 +20,9 @@ from ahf_ros.base.target import Target, TrueTarget
 from ahf_ros.detectors import DetectorSettings
 from ahf_ros.prints import RING_NAMES
 from ahf_ros.prints.ring import FAMILY_NAMES, family, ring_family
-from ahf_ros.synthetic.bent.picture import render_bent
-from ahf_ros.synthetic.patterns import LIGHT_NAMES, benchmark_lights
-from ahf_ros.synthetic.scene import SceneSettings, render
+from ahf_ros.scenes.bent.picture import render_bent
+from ahf_ros.scenes.patterns import LIGHT_NAMES, benchmark_lights
+from ahf_ros.scenes.scene import SceneSettings, render
 from support.pictures import bent, occluders
 from support.pictures.disturbed import blurred, compressed, noisy, overlapping
 from support.pictures.drawn_families import LIGHTS, TARGETS, random_family, sheet

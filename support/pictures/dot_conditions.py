@@ -13,8 +13,8 @@ import numpy as np
 from ahf_ros.base.target import DottedTarget
 from ahf_ros.detectors import create_detector
 from ahf_ros.prints.gsi import GSI_LIBRARY, point_family
-from ahf_ros.synthetic.patterns import LIGHT_NAMES
-from ahf_ros.synthetic.scene import Rendering, SceneSettings
+from ahf_ros.scenes.patterns import LIGHT_NAMES
+from ahf_ros.scenes.scene import Rendering, SceneSettings
 
 GSI = SceneSettings(
     family='gsi', width=1600, height=1200, targets=6, dot_radius=5.0, focal_length=6.0

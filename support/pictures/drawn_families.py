@@ -10,7 +10,7 @@ import numpy as np
 
 from ahf_ros.prints.cyclic import smallest_rotation
 from ahf_ros.prints.ring import conforming, ring_family
-from ahf_ros.synthetic.scene import Rendering, SceneSettings, render
+from ahf_ros.scenes.scene import Rendering, SceneSettings, render
 
 RULES: tuple[dict[str, Any], ...] = (
     {},

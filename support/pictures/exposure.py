@@ -10,7 +10,7 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
-from ahf_ros.synthetic.camera import Sensor
+from ahf_ros.scenes.camera import Sensor
 
 WHITE, INK = 220.0, 0.06
 """Gray value of the paper, and the reflectance of ink as a share of that of the paper."""

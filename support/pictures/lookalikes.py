@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 
 from ahf_ros.prints.ring import BITS, Family, sectors
-from ahf_ros.synthetic.covers import Cover, ink_cover, stamp_cover
+from ahf_ros.scenes.covers import Cover, ink_cover, stamp_cover
 from support.pictures.sheets import CELL, Ink
 
 _FINE = 61  # sectors of arcs of any length; a prime, so that they meet no sectors of a family

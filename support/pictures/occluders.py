@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 
 from ahf_ros.prints.ring import family
-from ahf_ros.synthetic.covers import ink_cover
+from ahf_ros.scenes.covers import ink_cover
 from support.pictures.exposure import GAMMA, INK, WHITE, Cell, Covered, Glare, Occluder
 
 _LABEL = 3.8  # radius of the paper that another target is printed on, dot radii

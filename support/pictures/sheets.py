@@ -18,7 +18,7 @@ from ahf_ros.base.target import TrueTarget
 from ahf_ros.prints.prints import Cells
 from ahf_ros.prints.ring import FAMILY_NAMES, family
 from ahf_ros.prints.square import CellPrint, dictionary
-from ahf_ros.synthetic.covers import Cover, ink_cover
+from ahf_ros.scenes.covers import Cover, ink_cover
 from support.pictures.exposure import GAMMA, INK, WHITE, Cell, Exposure
 
 Ink = Callable[[float], Cover]

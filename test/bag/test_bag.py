@@ -20,7 +20,7 @@ from rosbags import rosbag2
 
 from ahf_ros.bag import output, run
 from ahf_ros.bag.definitions import COMPRESSED_IMAGE, IMAGE, typestore
-from ahf_ros.synthetic.scene import Rendering, SceneSettings, render
+from ahf_ros.scenes.scene import Rendering, SceneSettings, render
 from support import bags, command_line, mcap
 
 ROOT = Path(__file__).resolve().parents[2]

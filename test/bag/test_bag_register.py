@@ -15,7 +15,7 @@ pytest.importorskip('rosbags', reason='rosbags is not installed')
 from ahf_ros.bag.definitions import IMAGE, typestore
 from ahf_ros.bag.registration import POINT_CLOUD
 from ahf_ros.files.cloud_files import read_cloud
-from ahf_ros.synthetic.scene import render
+from ahf_ros.scenes.scene import render
 from support import bags
 from support.command_line import status
 from support.wall import SCENE, SHIFT, as_cloud, moved

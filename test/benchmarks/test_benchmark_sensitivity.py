@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from ahf_ros.synthetic.scene import SceneSettings
+from ahf_ros.scenes.scene import SceneSettings
 from benchmarks.sensitivity import (
     Outcome,
     changed,

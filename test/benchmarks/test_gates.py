@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from ahf_ros.base.target import Target
-from ahf_ros.synthetic.scene import SceneSettings, render
+from ahf_ros.scenes.scene import SceneSettings, render
 from benchmarks import gates
 from benchmarks.changed import replace, verdicts
 from benchmarks.gates import (

@@ -12,7 +12,7 @@ import pytest
 from ahf_ros.cli.identify import image_paths
 from ahf_ros.files.image_files import read_image, write_image
 from ahf_ros.files.target_json import read_results
-from ahf_ros.synthetic.scene import SceneSettings, render
+from ahf_ros.scenes.scene import SceneSettings, render
 from ahf_ros.vision.image import as_oriented
 from support.command_line import status
 

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from ahf_ros.files.image_files import write_image
-from ahf_ros.synthetic.scene import Rendering, SceneSettings
+from ahf_ros.scenes.scene import Rendering, SceneSettings
 from support.command_line import status
 from support.scenes import rendered
 

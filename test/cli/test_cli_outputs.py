@@ -22,7 +22,7 @@ from ahf_ros.files.image_files import write_image
 from ahf_ros.files.truth_files import write_truth
 from ahf_ros.network.files.network_results import write_network
 from ahf_ros.prints.gsi import point_family, positions_of
-from ahf_ros.synthetic.scene import render
+from ahf_ros.scenes.scene import render
 from support import ROOT, bags
 from support.command_line import ahf, status
 from support.networks import records, simulated, solution

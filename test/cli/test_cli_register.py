@@ -11,7 +11,7 @@ import pytest
 from ahf_ros.cli import main
 from ahf_ros.files.cloud_files import read_cloud, write_pcd, write_ply
 from ahf_ros.files.image_files import write_image
-from ahf_ros.synthetic.scene import render
+from ahf_ros.scenes.scene import render
 from support.wall import SCENE, SHIFT, TURN, as_cloud, wall
 
 

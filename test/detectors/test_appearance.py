@@ -15,8 +15,8 @@ from ahf_ros.detectors.ring.decoding import Words
 from ahf_ros.detectors.ring.detector import find_hypotheses
 from ahf_ros.detectors.ring.polar import polar_images
 from ahf_ros.prints.ring import family
-from ahf_ros.synthetic.covers import Cover, ink_cover
-from ahf_ros.synthetic.scene import SceneSettings, render
+from ahf_ros.scenes.covers import Cover, ink_cover
+from ahf_ros.scenes.scene import SceneSettings, render
 from ahf_ros.vision.frame import ellipse_axes
 from support.pictures import occluders
 from support.pictures.disturbed import Targets

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from ahf_ros.network.export.survey import MeasuredImage, make_survey
+from ahf_ros.scenes.scene import SceneSettings
 from ahf_ros.session import identify
-from ahf_ros.synthetic.scene import SceneSettings
 from support.scenes import rendered
 
 

@@ -13,7 +13,7 @@ from ahf_ros.base.target import Target
 from ahf_ros.detectors import create_detector
 from ahf_ros.detectors.cctag.light import EDGES, Lights
 from ahf_ros.prints import CCTAG_NAMES
-from ahf_ros.synthetic.scene import Rendering
+from ahf_ros.scenes.scene import Rendering
 from support.pictures.textures import lookalikes, textured_image
 from support.scenes import counted, errors, rendering
 

@@ -12,7 +12,7 @@ from ahf_ros.detectors import create_detector
 from ahf_ros.detectors.cctag.joint import contested, jointly
 from ahf_ros.detectors.cctag.rings import Aligned, align
 from ahf_ros.prints.cctag import circle_family
-from ahf_ros.synthetic.scene import Rendering
+from ahf_ros.scenes.scene import Rendering
 from ahf_ros.vision import frame
 from support.scenes import counted, errors, relative_errors, rendering
 

@@ -11,7 +11,7 @@ import pytest
 from ahf_ros.detectors import DetectorSettings
 from ahf_ros.detectors.ring.counting import estimate_count
 from ahf_ros.prints.ring import family
-from ahf_ros.synthetic.scene import Rendering, SceneSettings
+from ahf_ros.scenes.scene import Rendering, SceneSettings
 from support.scenes import identified, rendered
 
 SMALL = SceneSettings(width=800, height=560, targets=6, seed=12)

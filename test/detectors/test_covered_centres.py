@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from ahf_ros.detectors import DetectorSettings, create_detector
-from ahf_ros.synthetic.scene import SceneSettings
+from ahf_ros.scenes.scene import SceneSettings
 from benchmarks.rows import normalised_squares
 from support.scenes import rendered
 

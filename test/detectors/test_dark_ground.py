@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from ahf_ros.detectors import create_detector
-from ahf_ros.evaluation import score
 from ahf_ros.prints.ring import family
-from ahf_ros.synthetic.bent.picture import render_bent
+from ahf_ros.scenes.bent.picture import render_bent
+from ahf_ros.scenes.evaluation import score
 from support.pictures.bent import settings
 from support.ring import inked
 

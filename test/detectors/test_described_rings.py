@@ -9,10 +9,10 @@ import pytest
 
 from ahf_ros.detectors import DetectorSettings, create_detector
 from ahf_ros.detectors.ring.detector import find_hypotheses
-from ahf_ros.evaluation import score
 from ahf_ros.prints.cyclic import smallest_rotation
 from ahf_ros.prints.ring import ring_family
-from ahf_ros.synthetic.scene import Rendering, SceneSettings, render
+from ahf_ros.scenes.evaluation import score
+from ahf_ros.scenes.scene import Rendering, SceneSettings, render
 from ahf_ros.vision.image import as_gray
 
 MINE = 'family: mine\nbits: 10\nband: {band}\nwords: all\n{more}'

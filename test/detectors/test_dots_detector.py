@@ -15,7 +15,7 @@ from ahf_ros.detectors.dots.detector import find_rings
 from ahf_ros.detectors.dots.discs import open_regions
 from ahf_ros.detectors.dots.rings import CERTAIN, WEIGHTS
 from ahf_ros.prints.dots import DOTS_DESIGN, dot_family
-from ahf_ros.synthetic.scene import Rendering
+from ahf_ros.scenes.scene import Rendering
 from ahf_ros.vision.frame import ellipse_axes
 from ahf_ros.vision.pyramid import image_pyramid
 from support.scenes import counted, rendering

@@ -7,9 +7,9 @@ import pytest
 
 from ahf_ros.detectors import DetectorSettings
 from ahf_ros.detectors.ring.counting import estimate_count
-from ahf_ros.evaluation import score
 from ahf_ros.prints import VENDOR_NAMES
-from ahf_ros.synthetic.scene import SceneSettings, render
+from ahf_ros.scenes.evaluation import score
+from ahf_ros.scenes.scene import SceneSettings, render
 from support.collage import Collage, collage
 from support.scenes import counts, identified
 from support.square_markers import needs_square_markers

@@ -7,7 +7,7 @@ import pytest
 
 from ahf_ros.detectors.cctag.glance import Circles, likely_rings
 from ahf_ros.prints.cctag import circle_family
-from ahf_ros.synthetic.scene import Rendering
+from ahf_ros.scenes.scene import Rendering
 from ahf_ros.vision import frame
 from ahf_ros.vision.dots import Dots
 from support.scenes import rendering

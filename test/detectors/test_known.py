@@ -13,8 +13,8 @@ from ahf_ros.detectors import Expecting, create_detector
 from ahf_ros.detectors.external.guarded import guarded
 from ahf_ros.detectors.ring.hypotheses import Hypotheses
 from ahf_ros.detectors.ring.known import NOTHING_KNOWN, Explained, Prior
-from ahf_ros.evaluation import RIGHT, WRONG, judge
 from ahf_ros.prints.ring import family
+from ahf_ros.scenes.evaluation import RIGHT, WRONG, judge
 from ahf_ros.vision import frame
 from ahf_ros.vision.pyramid import Octave, image_pyramid, octaves
 from support.drawn_dots import drawn, in_stripes

@@ -10,9 +10,9 @@ import pytest
 
 from ahf_ros import SceneSettings, UndecodedTarget, create_detector, identify, render
 from ahf_ros.base.target import UNDECODED, SquareMarker, Target
-from ahf_ros.evaluation import score
 from ahf_ros.prints.square import words
-from ahf_ros.synthetic.scene import Rendering
+from ahf_ros.scenes.evaluation import score
+from ahf_ros.scenes.scene import Rendering
 
 # How far its print reaches from the centre of a target, in its radius, and where its code is.
 KINDS = {

@@ -12,13 +12,13 @@ import pytest
 from ahf_ros.base.target import Truth
 from ahf_ros.detectors import DetectorSettings, create_detector
 from ahf_ros.detectors.ring.counting import estimate_count
-from ahf_ros.evaluation import FALSE, evaluate, judge, score, total
 from ahf_ros.files.image_files import read_image
 from ahf_ros.files.tables import read_points
 from ahf_ros.files.target_json import read_results
 from ahf_ros.files.truth_files import read_truth
 from ahf_ros.network.export.formats import FORMATS, Export
 from ahf_ros.network.export.survey import Control, read_measured_images
+from ahf_ros.scenes.evaluation import FALSE, evaluate, judge, score, total
 from support.command_line import ahf
 from support.exported import READERS
 from support.photographs import PANEL, WALL, needs_photographs

@@ -14,7 +14,7 @@ from ahf_ros.detectors.ring.families import read_families
 from ahf_ros.detectors.ring.hypotheses import Hypotheses
 from ahf_ros.detectors.ring.proposals import HOPEFUL, hopes, measure_alike, with_rims
 from ahf_ros.prints.ring import family
-from ahf_ros.synthetic.scene import SceneSettings, render
+from ahf_ros.scenes.scene import SceneSettings, render
 from ahf_ros.vision import frame
 from ahf_ros.vision.circle_fit import Fit
 from ahf_ros.vision.dots import Dots

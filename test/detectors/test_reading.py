@@ -13,7 +13,7 @@ from ahf_ros.detectors.ring.hypotheses import Hypotheses
 from ahf_ros.detectors.ring.polar import polar_images
 from ahf_ros.detectors.ring.reading import _by_dot, best_growth, read_bands
 from ahf_ros.prints.ring import FAMILY_NAMES, canonical, family, ring_family
-from ahf_ros.synthetic.scene import Rendering, SceneSettings
+from ahf_ros.scenes.scene import Rendering, SceneSettings
 from ahf_ros.vision.circle_fit import Fit
 from support.ring import lone_dot, measured
 from support.scenes import rendered

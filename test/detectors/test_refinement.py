@@ -14,7 +14,7 @@ from ahf_ros.detectors.ring.refinement import refine_centres
 from ahf_ros.filtering.identifier import Identifier
 from ahf_ros.filtering.settings import AdaptiveSettings, GeneticSettings
 from ahf_ros.prints.ring import family
-from ahf_ros.synthetic.scene import SceneSettings
+from ahf_ros.scenes.scene import SceneSettings
 from support.scenes import rendered
 
 SCENE = SceneSettings(width=700, height=500, targets=6, dot_radius=16.0, light='stripe', seed=3)

@@ -14,9 +14,9 @@ from ahf_ros.detectors import DetectorSettings, create_detector
 from ahf_ros.detectors.ring.counting import estimate_count
 from ahf_ros.detectors.ring.detector import find_hypotheses, read_image
 from ahf_ros.detectors.ring.refinement import refine_centres
-from ahf_ros.evaluation import score
 from ahf_ros.prints.ring import FAMILY_NAMES, family
-from ahf_ros.synthetic.scene import SceneSettings
+from ahf_ros.scenes.evaluation import score
+from ahf_ros.scenes.scene import SceneSettings
 from support.pictures import occluders
 from support.pictures.exposure import Exposure
 from support.pictures.lookalikes import other_sectors

@@ -16,7 +16,7 @@ from ahf_ros.detectors.ring.bands import find_bands
 from ahf_ros.files.image_files import read_image, write_image
 from ahf_ros.prints.cyclic import smallest_rotation
 from ahf_ros.prints.ring import conforming, family, ring_family
-from ahf_ros.synthetic.scene import Rendering, SceneSettings
+from ahf_ros.scenes.scene import Rendering, SceneSettings
 from support.command_line import status
 from support.photographs import PANEL, needs_photographs
 from support.scenes import rendered

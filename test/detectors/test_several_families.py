@@ -14,8 +14,8 @@ from ahf_ros.detectors import DetectorSettings, create_detector, estimator
 from ahf_ros.detectors.ring.choice import choose_families, further_families
 from ahf_ros.prints import RING_NAMES
 from ahf_ros.prints.ring import family
-from ahf_ros.synthetic.covers import Cover, ink_cover
-from ahf_ros.synthetic.scene import Rendering, SceneSettings
+from ahf_ros.scenes.covers import Cover, ink_cover
+from ahf_ros.scenes.scene import Rendering, SceneSettings
 from support.pictures.exposure import Exposure
 from support.pictures.sheets import mark_sheet
 from support.ring import measured

@@ -19,10 +19,10 @@ from ahf_ros.batch.task import ImageTask
 from ahf_ros.detectors import DetectorSettings, Narrowing, check_listed_ids, create_detector
 from ahf_ros.files.image_files import write_image
 from ahf_ros.filtering.identifier import Memory
+from ahf_ros.scenes.scene import SceneSettings
 from ahf_ros.session import create_identifier
 from ahf_ros.session_settings import IdentificationSettings
 from ahf_ros.settling import evident, settled_families, still_shown
-from ahf_ros.synthetic.scene import SceneSettings
 from ahf_ros.vision.stack import ImageStack
 from support.command_line import status
 from support.scenes import rendered

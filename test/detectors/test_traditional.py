@@ -10,12 +10,12 @@ import pytest
 
 from ahf_ros.base.target import UNDECODED, Target
 from ahf_ros.detectors import create_detector
-from ahf_ros.evaluation import score
 from ahf_ros.files.image_files import read_image
 from ahf_ros.files.truth_files import read_truth
 from ahf_ros.filtering.genes import BEGINNING, tuned
 from ahf_ros.filtering.homomorphic import HomomorphicFilter
-from ahf_ros.synthetic.scene import Rendering
+from ahf_ros.scenes.evaluation import score
+from ahf_ros.scenes.scene import Rendering
 from support.photographs import PANEL, needs_photographs
 from support.scenes import counted, relative_errors, rendering
 

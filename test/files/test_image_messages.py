@@ -22,7 +22,7 @@ from ahf_ros.files.image_messages import (
     decode_compressed,
     decode_image,
 )
-from ahf_ros.synthetic.scene import SceneSettings, render
+from ahf_ros.scenes.scene import SceneSettings, render
 from ahf_ros.vision.image import as_gray, check_image
 from support.hostile import IMAGES, SIDES, Fields, generators, mutated
 

@@ -20,8 +20,8 @@ from ahf_ros.filtering.settings import (
     TuningSettings,
 )
 from ahf_ros.filtering.trials import CONFIRMED
+from ahf_ros.scenes.scene import SceneSettings, render
 from ahf_ros.session import create_identifier
-from ahf_ros.synthetic.scene import SceneSettings, render
 
 COUNT = 144
 SHORT = AdaptiveSettings(fusion=False, genetic=GeneticSettings(max_evaluations=30))

@@ -25,7 +25,7 @@ from test_nodes_rig import in_space, read, scan, synthetic_camera
 
 from ahf_ros.clouds.point_clouds import organised_points
 from ahf_ros.nodes.drivers import DRIVERS, Driver
-from ahf_ros.synthetic.scene import Rendering, SceneSettings, render
+from ahf_ros.scenes.scene import Rendering, SceneSettings, render
 from support.launch_files import launched
 from support.live import PATIENCE, ros_environment
 

@@ -15,7 +15,7 @@ pytest.importorskip('ament_index_python', reason='ROS 2 is not installed')
 from ahf_ros.base.settings.nested import flat_parameters
 from ahf_ros.nodes.drivers import DRIVERS
 from ahf_ros.nodes.settings import DetectorNodeSettings
-from ahf_ros.synthetic.patterns import LIGHT_NAMES
+from ahf_ros.scenes.patterns import LIGHT_NAMES
 from support import ROOT
 from support.launch_files import USERS, Started, launched
 

@@ -27,7 +27,7 @@ from ahf_ros.base.settings.nested import flat_parameters
 from ahf_ros.msg import CodedTargetArray
 from ahf_ros.nodes.messages import image_message
 from ahf_ros.nodes.settings import DetectorNodeSettings
-from ahf_ros.synthetic.scene import Rendering, SceneSettings, render
+from ahf_ros.scenes.scene import Rendering, SceneSettings, render
 from support.detector import DetectorProcess, overrides, values
 
 CONFIG = Path(__file__).parents[2] / 'config' / 'detector.yaml'

@@ -19,7 +19,7 @@ from ahf_ros.msg import CodedTargetArray
 from ahf_ros.nodes.illumination import camera_info
 from ahf_ros.nodes.messages import image_message
 from ahf_ros.nodes.undistortion import Calibrations
-from ahf_ros.synthetic.scene import SceneSettings, render
+from ahf_ros.scenes.scene import SceneSettings, render
 from support.detector import DetectorProcess, overrides
 
 SCENE = SceneSettings(width=1000, height=700, targets=6, distortion=-0.2)

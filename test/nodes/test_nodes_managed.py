@@ -15,7 +15,7 @@ from std_msgs.msg import Header
 
 from ahf_ros.msg import CodedTargetArray
 from ahf_ros.nodes.messages import image_message
-from ahf_ros.synthetic.scene import SceneSettings, render
+from ahf_ros.scenes.scene import SceneSettings, render
 from support.detector import DetectorProcess, overrides
 
 TARGETS = 2

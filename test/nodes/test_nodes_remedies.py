@@ -25,7 +25,7 @@ from test_nodes import ENDLESS, header
 
 from ahf_ros.nodes.messages import image_message
 from ahf_ros.nodes.pipeline import IN_A_ROW
-from ahf_ros.synthetic.scene import SceneSettings, render
+from ahf_ros.scenes.scene import SceneSettings, render
 from support.detector import DetectorProcess, overrides, values
 
 pytestmark = pytest.mark.lasting

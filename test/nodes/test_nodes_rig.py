@@ -20,9 +20,9 @@ from visualization_msgs.msg import ImageMarker, Marker, MarkerArray
 from ahf_ros.clouds.point_clouds import COVARIANCE
 from ahf_ros.msg import CodedTargetArray
 from ahf_ros.nodes.messages import image_message
+from ahf_ros.scenes.camera import Camera, tilted_camera
+from ahf_ros.scenes.scene import Rendering, SceneSettings, render
 from ahf_ros.srv import Identify
-from ahf_ros.synthetic.camera import Camera, tilted_camera
-from ahf_ros.synthetic.scene import Rendering, SceneSettings, render
 from support.detector import DetectorProcess, overrides
 
 SCENE = SceneSettings(width=640, height=480, targets=6, dot_radius=10.0, tilt=30.0, seed=3)

@@ -29,8 +29,8 @@ from ahf_ros.msg import CodedTarget, CodedTargetArray
 from ahf_ros.nodes.messages import image_message
 from ahf_ros.nodes.process import Ending
 from ahf_ros.nodes.settings import DetectorNodeSettings
+from ahf_ros.scenes.scene import SceneSettings, render
 from ahf_ros.srv import Identify
-from ahf_ros.synthetic.scene import SceneSettings, render
 from support import live
 from support.detector import DetectorProcess, overrides
 from support.hostile import IMAGES, Fields

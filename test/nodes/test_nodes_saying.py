@@ -20,7 +20,7 @@ from test_nodes_rig import cloud_message
 
 from ahf_ros.msg import CodedTargetArray
 from ahf_ros.nodes.messages import image_message
-from ahf_ros.synthetic.scene import SceneSettings
+from ahf_ros.scenes.scene import SceneSettings
 from support.detector import DetectorProcess, overrides, own, values
 from support.scenes import rendered
 

@@ -40,8 +40,8 @@ from std_srvs.srv import Trigger
 
 from ahf_ros.msg import CodedTargetArray
 from ahf_ros.nodes.messages import image_message
+from ahf_ros.scenes.scene import SceneSettings, render
 from ahf_ros.srv import Identify
-from ahf_ros.synthetic.scene import SceneSettings, render
 from support import live
 from support.detector import overrides, own, values
 

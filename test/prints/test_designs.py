@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from ahf_ros.prints.designs import Arc, Contour, _outlines, contours
 from ahf_ros.prints.families import print_in
-from ahf_ros.synthetic.covers import ink_cover
+from ahf_ros.scenes.covers import ink_cover
 from support.square_markers import needs_square_markers
 
 ROUND = ('metashape12', 'metashape20', 'aicon14', 'gsi', 'dots', 'cctag4')

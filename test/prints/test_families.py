@@ -21,7 +21,7 @@ from ahf_ros.prints.families import (
     prints_of,
 )
 from ahf_ros.prints.gsi import GSI_LIBRARY
-from ahf_ros.synthetic.scene import SceneSettings
+from ahf_ros.scenes.scene import SceneSettings
 
 
 def test_families_keep_their_order():

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ahf_ros.synthetic.scene import SceneSettings
+from ahf_ros.scenes.scene import SceneSettings
 from ahf_ros.vision.common_search import CommonSearch
 from ahf_ros.vision.dot_search import voted_dots
 from ahf_ros.vision.frame import circle_outlines, mean_radii

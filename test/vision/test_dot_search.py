@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from ahf_ros.synthetic.scene import SceneSettings, render
+from ahf_ros.scenes.scene import SceneSettings, render
 from ahf_ros.vision import frame
 from ahf_ros.vision.dot_search import voted_dots, whole_dots, whole_outlines
 from ahf_ros.vision.dots import Dots

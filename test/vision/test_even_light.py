@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
-from ahf_ros.synthetic.scene import SceneSettings, render
+from ahf_ros.scenes.scene import SceneSettings, render
 from ahf_ros.vision.even_light import even_light
 
 

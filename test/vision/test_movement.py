@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from ahf_ros.base.target import Target
-from ahf_ros.synthetic.scene import SceneSettings, render
+from ahf_ros.scenes.scene import SceneSettings, render
 from ahf_ros.vision.movement import Displacement, displacement, find_edges, targets_moved
 
 LARGE = {'width': 640, 'height': 480, 'targets': 6, 'dot_radius': 16.0, 'phases': 4, 'seed': 5}

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from ahf_ros.prints.ring import family
-from ahf_ros.synthetic import prints
-from ahf_ros.synthetic.camera import Camera, tilted_camera
-from ahf_ros.synthetic.covers import Cover, distractor_cover, ink_cover
-from ahf_ros.synthetic.prints import Mark, print_mark
+from ahf_ros.scenes import prints
+from ahf_ros.scenes.camera import Camera, tilted_camera
+from ahf_ros.scenes.covers import Cover, distractor_cover, ink_cover
+from ahf_ros.scenes.prints import Mark, print_mark
 
 RING = family('metashape12')
 

@@ -13,9 +13,9 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from ahf_ros.synthetic.bent.scene import facing_axes
-from ahf_ros.synthetic.bent.settings import BentSettings
-from ahf_ros.synthetic.patterns import Pattern, light_pattern, turned
+from ahf_ros.scenes.bent.scene import facing_axes
+from ahf_ros.scenes.bent.settings import BentSettings
+from ahf_ros.scenes.patterns import Pattern, light_pattern, turned
 
 _PER_DOT = 6.4  # projector pixels in the radius of a dot, as with the other maker
 _ASIDE = (12.0, 20.0)  # of the projector, seen from the middle of the scene, degrees

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from ahf_ros.synthetic.camera import Camera
-from ahf_ros.synthetic.patterns import Pattern
+from ahf_ros.scenes.camera import Camera
+from ahf_ros.scenes.patterns import Pattern
 
 _STRIP = 128  # rows computed at a time, which stay in the cache of a core
 _FIELD_STEP = 16  # px between the samples of smooth light

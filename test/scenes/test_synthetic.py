@@ -11,7 +11,7 @@ import pytest
 
 from ahf_ros.base.target import Target
 from ahf_ros.prints.ring import family
-from ahf_ros.synthetic.scene import Rendering, SceneSettings, render
+from ahf_ros.scenes.scene import Rendering, SceneSettings, render
 
 SMALL = SceneSettings(width=480, height=360, targets=6, dot_radius=12.0)
 IDEAL = replace(SMALL, texture=0.0, full_well=0.0, pinhole=0.0, exposure=240.0)

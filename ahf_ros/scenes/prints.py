@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from ahf_ros.synthetic.camera import Camera
-from ahf_ros.synthetic.covers import Cover
+from ahf_ros.scenes.camera import Camera
+from ahf_ros.scenes.covers import Cover
 
 _SUPERSAMPLING = 3  # samples per pixel along each axis
 _EDGE = 2.0  # width of a drawn edge, samples; the blur that follows is reduced accordingly

@@ -24,7 +24,7 @@ from ahf_ros.base.target import UNDECODED, Identification, Target, TrueTarget, T
 from ahf_ros.base.text import printable
 
 if TYPE_CHECKING:
-    from ahf_ros.synthetic.scene import Rendering
+    from ahf_ros.scenes.scene import Rendering
 
 TOLERANCE = 5.0
 """Maximum distance of a report from its target, px."""

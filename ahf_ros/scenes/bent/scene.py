@@ -11,11 +11,11 @@ import numpy as np
 
 from ahf_ros.base.target import Target
 from ahf_ros.prints.designs import Contour, circle, contours
-from ahf_ros.synthetic.bent.lens import Lens
-from ahf_ros.synthetic.bent.settings import BentSettings, sheet_grid
-from ahf_ros.synthetic.bent.sheet import Sheet
-from ahf_ros.synthetic.layout import fitting_grid
-from ahf_ros.synthetic.scene import drawn_numbers
+from ahf_ros.scenes.bent.lens import Lens
+from ahf_ros.scenes.bent.settings import BentSettings, sheet_grid
+from ahf_ros.scenes.bent.sheet import Sheet
+from ahf_ros.scenes.layout import fitting_grid
+from ahf_ros.scenes.scene import drawn_numbers
 
 _OFF_MIDDLE = 0.01  # of the principal point, in image widths
 _STEP = 1e-3  # of numerical derivatives, mm

@@ -9,8 +9,8 @@ from typing import Any
 from ahf_ros.base.settings.parameter import check_parameters, parameter
 from ahf_ros.prints.families import FamilyPrint, print_in
 from ahf_ros.prints.prints import Proportions
-from ahf_ros.synthetic.layout import finest_grid, quiet_radius
-from ahf_ros.synthetic.scene import SceneSettings, check_distortion
+from ahf_ros.scenes.layout import finest_grid, quiet_radius
+from ahf_ros.scenes.scene import SceneSettings, check_distortion
 
 STEEPEST = 75.0
 """Largest angle between the view and the normal of a sheet at a target, degrees."""

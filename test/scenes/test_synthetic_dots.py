@@ -15,10 +15,10 @@ from ahf_ros.prints.dots import dot_family
 from ahf_ros.prints.families import print_in
 from ahf_ros.prints.gsi import GSI_LIBRARY, point_family
 from ahf_ros.prints.ring import family
-from ahf_ros.synthetic.camera import Camera, tilted_camera
-from ahf_ros.synthetic.covers import ink_cover
-from ahf_ros.synthetic.prints import Mark, print_mark
-from ahf_ros.synthetic.scene import SceneSettings, render
+from ahf_ros.scenes.camera import Camera, tilted_camera
+from ahf_ros.scenes.covers import ink_cover
+from ahf_ros.scenes.prints import Mark, print_mark
+from ahf_ros.scenes.scene import SceneSettings, render
 from support.square_markers import needs_square_markers
 
 GSI, DOTS = point_family(), dot_family()

@@ -16,9 +16,9 @@ from ahf_ros.base.target import Target, TrueTarget, sorted_targets
 from ahf_ros.prints.families import ONE, FamilyPrint, print_in
 from ahf_ros.prints.gsi import PointFamily
 from ahf_ros.prints.prints import Proportions
-from ahf_ros.synthetic.camera import Camera, Sensor, tilted_camera
-from ahf_ros.synthetic.covers import card_cover, distractor_cover, ink_cover
-from ahf_ros.synthetic.layout import (
+from ahf_ros.scenes.camera import Camera, Sensor, tilted_camera
+from ahf_ros.scenes.covers import card_cover, distractor_cover, ink_cover
+from ahf_ros.scenes.layout import (
     Placements,
     finest_grid,
     grid_placements,
@@ -26,9 +26,9 @@ from ahf_ros.synthetic.layout import (
     scattered_placements,
     size_ratios,
 )
-from ahf_ros.synthetic.patterns import LIGHT_NAMES, light_pattern, turned
-from ahf_ros.synthetic.prints import Mark, mark_at, print_mark
-from ahf_ros.synthetic.radiance import paper_texture, rig_projector, wall_radiance
+from ahf_ros.scenes.patterns import LIGHT_NAMES, light_pattern, turned
+from ahf_ros.scenes.prints import Mark, mark_at, print_mark
+from ahf_ros.scenes.radiance import paper_texture, rig_projector, wall_radiance
 
 _CARD_WIDTH = math.cos(math.pi / 8)  # of eight sides, as a share of the distance of its corners
 _MAXIMUM_SHIFT = 0.35  # of edges, in dot radii: nearly half a sector of the finest ring codes

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from ahf_ros.synthetic.camera import Camera, Sensor, tilted_camera
+from ahf_ros.scenes.camera import Camera, Sensor, tilted_camera
 
 PIXELS = np.array([[0.0, 0.0], [319.5, 239.5], [639.0, 479.0], [12.25, 400.5]])
 

@@ -7,9 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from ahf_ros.synthetic.camera import tilted_camera
-from ahf_ros.synthetic.patterns import LIGHT_NAMES, benchmark_lights, light_pattern, turned
-from ahf_ros.synthetic.radiance import rig_projector
+from ahf_ros.scenes.camera import tilted_camera
+from ahf_ros.scenes.patterns import LIGHT_NAMES, benchmark_lights, light_pattern, turned
+from ahf_ros.scenes.radiance import rig_projector
 
 
 def shine(name: str, defocus: float = 0.5, seed: int = 0) -> np.ndarray:

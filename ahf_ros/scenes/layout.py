@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ahf_ros.synthetic.camera import Camera
+from ahf_ros.scenes.camera import Camera
 
 MAXIMUM_VIEW_ANGLE = 75.0
 """Largest angle between the wall's normal and the ray to a target, degrees, where the wall is not

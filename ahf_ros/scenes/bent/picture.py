@@ -16,12 +16,12 @@ import numpy as np
 
 from ahf_ros.base.blas import one_blas_thread
 from ahf_ros.base.target import Target, sorted_targets
-from ahf_ros.synthetic.bent import exposure
-from ahf_ros.synthetic.bent.grain import Grain
-from ahf_ros.synthetic.bent.ink import inked
-from ahf_ros.synthetic.bent.lens import Lens
-from ahf_ros.synthetic.bent.light import Light, drawn_light, surface_light
-from ahf_ros.synthetic.bent.scene import (
+from ahf_ros.scenes.bent import exposure
+from ahf_ros.scenes.bent.grain import Grain
+from ahf_ros.scenes.bent.ink import inked
+from ahf_ros.scenes.bent.lens import Lens
+from ahf_ros.scenes.bent.light import Light, drawn_light, surface_light
+from ahf_ros.scenes.bent.scene import (
     Printed,
     PrintedSheet,
     around,
@@ -29,7 +29,7 @@ from ahf_ros.synthetic.bent.scene import (
     drawn_lens,
     drawn_sheets,
 )
-from ahf_ros.synthetic.bent.settings import BentSettings
+from ahf_ros.scenes.bent.settings import BentSettings
 
 _SAMPLES = 4  # rays per pixel along each axis, and finer ones per ray at edges of ink
 _STRIP = 64  # rows of pixels at a time, to bound the memory

@@ -11,14 +11,14 @@ import pytest
 
 from ahf_ros.prints.designs import circle, contours
 from ahf_ros.prints.families import FAMILY_NAMES, print_in
-from ahf_ros.synthetic.bent import exposure
-from ahf_ros.synthetic.bent.ink import inked
-from ahf_ros.synthetic.bent.lens import Lens
-from ahf_ros.synthetic.bent.light import drawn_light, surface_light
-from ahf_ros.synthetic.bent.picture import BentRendering, render_bent
-from ahf_ros.synthetic.bent.settings import BentSettings
-from ahf_ros.synthetic.bent.sheet import Sheet
-from ahf_ros.synthetic.covers import ink_cover
+from ahf_ros.scenes.bent import exposure
+from ahf_ros.scenes.bent.ink import inked
+from ahf_ros.scenes.bent.lens import Lens
+from ahf_ros.scenes.bent.light import drawn_light, surface_light
+from ahf_ros.scenes.bent.picture import BentRendering, render_bent
+from ahf_ros.scenes.bent.settings import BentSettings
+from ahf_ros.scenes.bent.sheet import Sheet
+from ahf_ros.scenes.covers import ink_cover
 from support.square_markers import needs_square_markers
 
 SMALL = BentSettings(width=520, height=350, targets=6, sheets=6, dot_radius=8.0)

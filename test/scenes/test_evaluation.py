@@ -6,9 +6,9 @@ import math
 
 import pytest
 
-from ahf_ros import evaluation
 from ahf_ros.base.target import UNDECODED, Target, TrueTarget
-from ahf_ros.evaluation import (
+from ahf_ros.scenes import evaluation
+from ahf_ros.scenes.evaluation import (
     FALSE,
     FOUND,
     RIGHT,

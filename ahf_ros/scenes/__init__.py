@@ -1,0 +1,1 @@
+"""Synthetic images of coded targets on a wall, with exact truth, and results against it."""

@@ -1,1 +1,0 @@
-"""Synthetic images of coded targets on a wall, with exact truth."""
