@@ -60,7 +60,7 @@ test-native: test-live test-detectors test-commands test-computing
 # What runs nodes, what runs commands, what identifies targets in many images, and the rest.
 LIVE = test/nodes test/test_every_way.py
 COMMANDS = test/bag test/batch test/cli
-DETECTORS = test/benchmarks test/detectors
+DETECTORS = test/benchmarks test/families
 
 test-live: $(READY)
 	$(BIN)/python -m pytest $(LIVE)
@@ -108,7 +108,7 @@ test-oldest: $(OLDEST)/ready
 # What the oldest OpenCV does not have, without those vector units.
 test-portable: $(READY)
 	$(BIN)/python -m support.vector_units baseline $(BIN)/python -m pytest \
-		-m 'not lasting' test/detectors/test_square.py test/detectors/test_edges.py
+		-m 'not lasting' test/families/test_square.py test/families/test_edges.py
 
 # What talks to ROS 2, on Kilted, with no more installed than that needs; what lasts long does so on
 # Jazzy only.

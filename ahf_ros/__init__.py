@@ -8,12 +8,12 @@ from pkgutil import extend_path
 from typing import TYPE_CHECKING, Any
 
 _MODULES = {
-    'DETECTOR_NAMES': 'detectors',
-    'FAMILY_NAMES': 'detectors',
+    'DETECTOR_NAMES': 'families',
+    'FAMILY_NAMES': 'families',
     'UNDECODED': 'base.target',
     'AdaptiveSettings': 'filtering.settings',
-    'Detector': 'detectors',
-    'DetectorSettings': 'detectors',
+    'Detector': 'families',
+    'DetectorSettings': 'families',
     'DottedTarget': 'base.target',
     'FilterState': 'base.target',
     'Identification': 'base.target',
@@ -28,7 +28,7 @@ _MODULES = {
     'UndecodedTarget': 'base.target',
     'adjust': 'network.adjustment',
     'compare': 'network.congruence',
-    'create_detector': 'detectors',
+    'create_detector': 'families',
     'create_identifier': 'session',
     'draw': 'drawing.overlay',
     'identify': 'session',
@@ -50,12 +50,12 @@ if TYPE_CHECKING:  # which takes what is imported `as` itself for public
     from ahf_ros.base.target import Target as Target
     from ahf_ros.base.target import TrueTarget as TrueTarget
     from ahf_ros.base.target import UndecodedTarget as UndecodedTarget
-    from ahf_ros.detectors import DETECTOR_NAMES as DETECTOR_NAMES
-    from ahf_ros.detectors import FAMILY_NAMES as FAMILY_NAMES
-    from ahf_ros.detectors import Detector as Detector
-    from ahf_ros.detectors import DetectorSettings as DetectorSettings
-    from ahf_ros.detectors import create_detector as create_detector
     from ahf_ros.drawing.overlay import draw as draw
+    from ahf_ros.families import DETECTOR_NAMES as DETECTOR_NAMES
+    from ahf_ros.families import FAMILY_NAMES as FAMILY_NAMES
+    from ahf_ros.families import Detector as Detector
+    from ahf_ros.families import DetectorSettings as DetectorSettings
+    from ahf_ros.families import create_detector as create_detector
     from ahf_ros.files.image_files import read_image as read_image
     from ahf_ros.files.image_files import write_image as write_image
     from ahf_ros.filtering.identifier import Identifier as Identifier

@@ -27,10 +27,10 @@ from ahf_ros.base.doubt import repeated_remark
 from ahf_ros.base.edge_shift import edge_shift_remark, median_edge_shift
 from ahf_ros.base.target import UNDECODED, Target, repeated_targets
 from ahf_ros.base.text import counted
-from ahf_ros.detectors import Contesting, create_detector
-from ahf_ros.detectors.contract import DetectorSettings
-from ahf_ros.detectors.learning.rings import LearntFamily, learn_families
-from ahf_ros.detectors.ring.bands import DotsOfOctave, bands_about, dots_in
+from ahf_ros.families import Contesting, create_detector
+from ahf_ros.families.contract import DetectorSettings
+from ahf_ros.families.learning.rings import LearntFamily, learn_families
+from ahf_ros.families.ring.bands import DotsOfOctave, bands_about, dots_in
 from ahf_ros.prints import SQUARE_NAMES
 from ahf_ros.prints.families import AUTO, prints_of
 from ahf_ros.prints.ring import FAMILY_NAMES, Family, words_of_print

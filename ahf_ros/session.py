@@ -13,7 +13,7 @@ from ahf_ros.base.deprecation import deprecated_arguments
 from ahf_ros.base.settings.nested import updated
 from ahf_ros.base.target import Identification
 from ahf_ros.base.text import shown
-from ahf_ros.detectors import (
+from ahf_ros.families import (
     Contesting,
     Detector,
     Drafter,

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 
 from ahf_ros.base.settings.parameter import check_parameters, parameter
 from ahf_ros.base.text import counted
-from ahf_ros.detectors import DETECTOR, DetectorSettings, detector_name, estimator
+from ahf_ros.families import DETECTOR, DetectorSettings, detector_name, estimator
 from ahf_ros.filtering.settings import AdaptiveSettings
 from ahf_ros.vision import MAXIMUM_IMAGES
 
@@ -28,7 +28,7 @@ class IdentificationSettings:
     Attributes
     ----------
     detector : str
-        One of `ahf_ros.detectors.DETECTOR_NAMES`, or 'auto' for the detector of the family.
+        One of `ahf_ros.families.DETECTOR_NAMES`, or 'auto' for the detector of the family.
     expected_targets : int
         N, the number of coded targets in every image; 0 where unknown.
     estimate_expected : bool

@@ -24,8 +24,8 @@ from ahf_ros.base.deprecation import deprecated_arguments
 from ahf_ros.base.notices import said_once
 from ahf_ros.base.target import UNDECODED, Identification, Target, UndecodedTarget
 from ahf_ros.base.target_check import checked_targets
-from ahf_ros.detectors.evidence import Reading, evidence, is_clear, reading_of
-from ahf_ros.detectors.explained import without_targets
+from ahf_ros.families.evidence import Reading, evidence, is_clear, reading_of
+from ahf_ros.families.explained import without_targets
 from ahf_ros.filtering.genetic import Values
 from ahf_ros.filtering.identifier import Identifier, Memory
 from ahf_ros.filtering.trials import DetectorFunction, Trials

@@ -16,7 +16,7 @@ import numpy as np
 
 from ahf_ros.base.target import Identification, Target, count_codes
 from ahf_ros.base.text import printable, reason_of
-from ahf_ros.detectors.contract import Detector, Unavailable
+from ahf_ros.families.contract import Detector, Unavailable
 from ahf_ros.files.image_files import NotedImage
 from ahf_ros.files.image_messages import decode_compressed, decode_image, nanoseconds
 from ahf_ros.files.target_messages import DROPPED, FAILED, REJECTED

@@ -23,7 +23,7 @@ from typing import Any
 
 import numpy as np
 
-from ahf_ros.detectors import DETECTOR_NAMES
+from ahf_ros.families import DETECTOR_NAMES
 from ahf_ros.prints.families import FAMILY_NAMES
 from ahf_ros.scenes.bent.picture import render_bent
 from ahf_ros.scenes.evaluation import total

@@ -27,15 +27,15 @@ from typing import NamedTuple
 import numpy as np
 
 from ahf_ros.base.target import Target
-from ahf_ros.detectors import DetectorSettings
-from ahf_ros.detectors.dots import rings as dots
-from ahf_ros.detectors.dots.detector import find_rings
-from ahf_ros.detectors.gsi import hypotheses as gsi
-from ahf_ros.detectors.gsi.detector import find_hypotheses as find_gsi_hypotheses
-from ahf_ros.detectors.ring import confidence as ring
-from ahf_ros.detectors.ring.contests import overlapping
-from ahf_ros.detectors.ring.detector import find_hypotheses
-from ahf_ros.detectors.ring.hypotheses import Hypotheses
+from ahf_ros.families import DetectorSettings
+from ahf_ros.families.dots import rings as dots
+from ahf_ros.families.dots.detector import find_rings
+from ahf_ros.families.gsi import hypotheses as gsi
+from ahf_ros.families.gsi.detector import find_hypotheses as find_gsi_hypotheses
+from ahf_ros.families.ring import confidence as ring
+from ahf_ros.families.ring.contests import overlapping
+from ahf_ros.families.ring.detector import find_hypotheses
+from ahf_ros.families.ring.hypotheses import Hypotheses
 from ahf_ros.prints.dots import dot_family
 from ahf_ros.prints.gsi import point_family
 from ahf_ros.prints.ring import Family, canonical

@@ -16,9 +16,9 @@ from statistics import mean, median
 
 import numpy as np
 
-from ahf_ros.detectors.contract import DetectorSettings
-from ahf_ros.detectors.ring.counting import estimate_count
-from ahf_ros.detectors.ring.detector import RingDetector
+from ahf_ros.families.contract import DetectorSettings
+from ahf_ros.families.ring.counting import estimate_count
+from ahf_ros.families.ring.detector import RingDetector
 from ahf_ros.scenes.patterns import benchmark_lights
 from ahf_ros.scenes.scene import SceneSettings, render
 from benchmarks import report

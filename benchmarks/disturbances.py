@@ -21,8 +21,8 @@ from pathlib import Path
 import numpy as np
 
 from ahf_ros.base.target import Target, TrueTarget
-from ahf_ros.detectors import DetectorSettings, create_detector
-from ahf_ros.detectors.contract import Detector, Expecting
+from ahf_ros.families import DetectorSettings, create_detector
+from ahf_ros.families.contract import Detector, Expecting
 from ahf_ros.files.image_files import read_image
 from ahf_ros.files.truth_files import read_truth
 from ahf_ros.prints import RING_NAMES

@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from ahf_ros.detectors import create_detector
+from ahf_ros.families import create_detector
 from ahf_ros.scenes.scene import SceneSettings, render
 from benchmarks import report
 from benchmarks.confidence import reliability

@@ -19,7 +19,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from ahf_ros.detectors import create_detector
+from ahf_ros.families import create_detector
 from ahf_ros.files.image_files import read_image
 from ahf_ros.scenes.evaluation import score
 from ahf_ros.scenes.scene import SceneSettings, render

@@ -24,7 +24,7 @@ from typing import Any
 
 import numpy as np
 
-from ahf_ros.detectors import DETECTOR_NAMES, DetectorSettings, create_detector
+from ahf_ros.families import DETECTOR_NAMES, DetectorSettings, create_detector
 from ahf_ros.files.image_files import read_image
 from ahf_ros.files.truth_files import read_truth
 from ahf_ros.prints.ring import FAMILY_NAMES

@@ -24,7 +24,7 @@ from dataclasses import replace
 from itertools import product
 from typing import Any
 
-from ahf_ros.detectors import DETECTOR_NAMES
+from ahf_ros.families import DETECTOR_NAMES
 from ahf_ros.prints.families import FAMILY_NAMES
 from ahf_ros.scenes.patterns import LIGHT_NAMES
 from ahf_ros.scenes.scene import SceneSettings, render

@@ -23,8 +23,8 @@ from typing import Any
 
 import numpy as np
 
-from ahf_ros.detectors import create_detector
-from ahf_ros.detectors.ring.confidence import confidence
+from ahf_ros.families import create_detector
+from ahf_ros.families.ring.confidence import confidence
 from ahf_ros.prints import RING_NAMES
 from ahf_ros.prints.families import FAMILY_NAMES, print_in
 from ahf_ros.scenes.bent.picture import render_bent

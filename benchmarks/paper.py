@@ -30,7 +30,7 @@ import cv2
 import numpy as np
 
 from ahf_ros.base.target import Identification
-from ahf_ros.detectors import Drafter, Refiner, create_detector
+from ahf_ros.families import Drafter, Refiner, create_detector
 from ahf_ros.filtering.identifier import Identifier
 from ahf_ros.filtering.settings import (
     EXTENDED,

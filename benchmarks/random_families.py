@@ -17,9 +17,9 @@ from typing import Any
 
 import numpy as np
 
-from ahf_ros.detectors import DetectorSettings, create_detector
-from ahf_ros.detectors.learning.rings import LearntFamily, learn_families
-from ahf_ros.detectors.ring.bands import find_bands
+from ahf_ros.families import DetectorSettings, create_detector
+from ahf_ros.families.learning.rings import LearntFamily, learn_families
+from ahf_ros.families.ring.bands import find_bands
 from ahf_ros.prints.ring import Family, conforming, ring_family
 from ahf_ros.scenes.evaluation import Score, score, total
 from benchmarks import report

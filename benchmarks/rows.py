@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 
 from ahf_ros.base.target import Target, TrueTarget
-from ahf_ros.detectors import DetectorSettings, create_detector
+from ahf_ros.families import DetectorSettings, create_detector
 from ahf_ros.scenes.evaluation import RIGHT, Score, judge, score, total
 from ahf_ros.scenes.scene import SceneSettings, render
 from ahf_ros.session import identify

@@ -36,7 +36,7 @@ from benchmarks.report import progress, table
 from support.pictures.conditions import Scene, disturbed, strange
 
 ROOT = Path(__file__).resolve().parent.parent
-ROOMS = ('ahf_ros.vision.', 'ahf_ros.detectors.ring.')
+ROOMS = ('ahf_ros.vision.', 'ahf_ros.families.ring.')
 BOUNDED = {'CERTAIN', '_STRAIGHT', 'WHOLE', '_MINIMUM_AGREEMENT'}
 """Constants that are meaningful up to 1 only: their distance from 1 is halved and doubled."""
 
@@ -114,7 +114,7 @@ def constants() -> Iterator[tuple[str, float]]:
 
 def modules() -> list[str]:
     """Return the modules in the rooms of `ring` that it imports, as a new process reports."""
-    names = 'import sys, ahf_ros.detectors.ring.detector; print(*sorted(sys.modules))'
+    names = 'import sys, ahf_ros.families.ring.detector; print(*sorted(sys.modules))'
     done = subprocess.run(
         [sys.executable, '-c', names], cwd=ROOT, check=True, capture_output=True, text=True
     )

@@ -16,7 +16,7 @@ from collections.abc import Iterator, Sequence
 from itertools import product
 from typing import Any
 
-from ahf_ros.detectors import create_detector
+from ahf_ros.families import create_detector
 from ahf_ros.scenes.evaluation import RIGHT, judge, score
 from benchmarks import report
 from benchmarks.report import FIRST_TEST_SEED, number

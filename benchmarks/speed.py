@@ -27,7 +27,7 @@ from typing import Any
 import numpy as np
 
 from ahf_ros.base.target import count_codes
-from ahf_ros.detectors import Drafter, create_detector
+from ahf_ros.families import Drafter, create_detector
 from ahf_ros.filtering.genes import genes_of
 from ahf_ros.filtering.genetic import search
 from ahf_ros.filtering.homomorphic import HomomorphicFilter, median_distance

@@ -19,7 +19,7 @@ import cv2
 import numpy as np
 
 from ahf_ros.base.target import Target
-from ahf_ros.detectors import create_detector
+from ahf_ros.families import create_detector
 from ahf_ros.settling import evident
 from benchmarks import report
 from support.pictures.textures import lookalikes, textured_image

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from ahf_ros.base.settings.nested import flat_parameters
 from ahf_ros.base.settings.parameter import Parameter
-from ahf_ros.detectors import DetectorSettings
+from ahf_ros.families import DetectorSettings
 from ahf_ros.session_settings import IdentificationSettings
 
 FILE = Path(__file__).resolve().parent.parent / 'ahf_ros' / 'base' / 'options.py'

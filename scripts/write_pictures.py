@@ -16,18 +16,18 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ahf_ros import ImageStack, SceneSettings, create_detector, create_identifier, render
-from ahf_ros.detectors.contract import DetectorSettings
-from ahf_ros.detectors.ring.circles import REACH
-from ahf_ros.detectors.ring.decoding import Words, decode
-from ahf_ros.detectors.ring.detector import find_hypotheses
-from ahf_ros.detectors.ring.hypotheses import Hypotheses
-from ahf_ros.detectors.ring.light import predicted_light
-from ahf_ros.detectors.ring.likelihood import (
+from ahf_ros.families.contract import DetectorSettings
+from ahf_ros.families.ring.circles import REACH
+from ahf_ros.families.ring.decoding import Words, decode
+from ahf_ros.families.ring.detector import find_hypotheses
+from ahf_ros.families.ring.hypotheses import Hypotheses
+from ahf_ros.families.ring.light import predicted_light
+from ahf_ros.families.ring.likelihood import (
     Evidence,
     edge_evidence,
     level_evidence,
 )
-from ahf_ros.detectors.ring.polar import angles_of, polar_images
+from ahf_ros.families.ring.polar import angles_of, polar_images
 from ahf_ros.filtering.homomorphic import HomomorphicFilter
 from ahf_ros.prints.designs import contours
 from ahf_ros.prints.families import print_in

@@ -5,7 +5,7 @@ from __future__ import annotations
 import runpy
 from pathlib import Path
 
-from ahf_ros.detectors import GROUP, Detector, DetectorSettings
+from ahf_ros.families import GROUP, Detector, DetectorSettings
 from support import ROOT
 
 EXAMPLE = ROOT / 'docs' / 'examples' / 'my_detector.py'

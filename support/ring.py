@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ahf_ros.detectors.ring.circles import REACH
+from ahf_ros.families.ring.circles import REACH
 from ahf_ros.prints.ring import Family
 from ahf_ros.vision.circle_fit import Fit, fit_dots
 from ahf_ros.vision.frame import affine_frames

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ahf_ros.base.target import Target
-from ahf_ros.detectors import create_detector
+from ahf_ros.families import create_detector
 from ahf_ros.scenes.evaluation import Score, score
 from ahf_ros.scenes.scene import Rendering, SceneSettings, render
 

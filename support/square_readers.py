@@ -8,8 +8,8 @@ import cv2
 import numpy as np
 
 from ahf_ros.base.target import Target
-from ahf_ros.detectors import create_detector
-from ahf_ros.detectors.square.frames import centres
+from ahf_ros.families import create_detector
+from ahf_ros.families.square.frames import centres
 from ahf_ros.prints.square import dictionary
 
 FAMILY = 'apriltag_36h11'

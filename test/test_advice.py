@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from ahf_ros.advice import IN_A_ROW, Adviser, advice, advice_on_all
-from ahf_ros.detectors import DetectorSettings
+from ahf_ros.families import DetectorSettings
 from ahf_ros.files.image_files import write_image
 from ahf_ros.prints.ring import ring_family
 from ahf_ros.scenes.scene import SceneSettings

@@ -49,7 +49,7 @@ MAY_OPEN = {
     'batch/engine.py': 'what the system says of cores',
     'batch/results.py': 'results that are gone on with, see test_results.py',
     'cli/__init__.py': 'standard streams',
-    'detectors/external/command.py': 'what a program printed',
+    'families/external/command.py': 'what a program printed',
     'vision/logistic.py': 'weights of the package',
     'nodes/process.py': 'no files',
     'nodes/processes.py': 'what the system says of processes',

@@ -9,7 +9,7 @@ import pytest
 
 from ahf_ros.base.settings.nested import flat_parameters, flat_values, updated
 from ahf_ros.base.target import Target
-from ahf_ros.detectors import DetectorSettings, create_detector
+from ahf_ros.families import DetectorSettings, create_detector
 from ahf_ros.filtering.settings import AdaptiveSettings
 from ahf_ros.nodes.settings import DetectorNodeSettings
 from ahf_ros.scenes.scene import SceneSettings

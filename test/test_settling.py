@@ -14,8 +14,8 @@ import numpy as np
 import pytest
 
 from ahf_ros.base.target import Target
-from ahf_ros.detectors import create_detector
-from ahf_ros.detectors.explained import without_targets
+from ahf_ros.families import create_detector
+from ahf_ros.families.explained import without_targets
 from ahf_ros.files.image_files import write_image
 from ahf_ros.scenes.scene import SceneSettings, render
 from ahf_ros.session import create_identifier, identify

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ahf_ros.detectors import create_detector
-from ahf_ros.detectors.contract import DetectorSettings, Unavailable
+from ahf_ros.families import create_detector
+from ahf_ros.families.contract import DetectorSettings, Unavailable
 from ahf_ros.scenes.scene import SceneSettings, render
 from ahf_ros.session import create_identifier
 from ahf_ros.session_settings import IdentificationSettings

@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 import pytest
 
-from ahf_ros.detectors.external.command import words_of
+from ahf_ros.families.external.command import words_of
 from ahf_ros.files.files import checked_file_name
 from support import ROOT, packages
 from support.command_line import python, status

@@ -42,9 +42,9 @@ from ahf_ros.base import ending
 from ahf_ros.base.opening import parsing
 from ahf_ros.base.settings.nested import flat_values
 from ahf_ros.base.writing import locked
-from ahf_ros.detectors import create_detector
-from ahf_ros.detectors.contract import Unavailable
 from ahf_ros.drawing.overlay import draw
+from ahf_ros.families import create_detector
+from ahf_ros.families.contract import Unavailable
 from ahf_ros.files.target_messages import coded_target_array, unanswered
 from ahf_ros.session_settings import IdentificationSettings, StackSettings
 from ahf_ros.settling import settled_families

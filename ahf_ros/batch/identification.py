@@ -19,8 +19,8 @@ from ahf_ros.base.target import UNDECODED, Identification, Target, UndecodedTarg
 from ahf_ros.base.text import listed
 from ahf_ros.batch.engine import Report, no_report
 from ahf_ros.batch.task import ImageOutcome, ImageTask, Level, Message
-from ahf_ros.detectors import Detector, DetectorSettings, create_detector
 from ahf_ros.drawing.overlay import draw, summary
+from ahf_ros.families import Detector, DetectorSettings, create_detector
 from ahf_ros.files.image_files import read_noted_image, write_image
 from ahf_ros.files.target_json import to_json
 from ahf_ros.session import create_identifier

@@ -10,7 +10,7 @@ from ahf_ros.base.target import UNDECODED
 from ahf_ros.batch.engine import Engine, finished_tasks, in_order
 from ahf_ros.batch.results import outcome_of
 from ahf_ros.batch.task import ImageOutcome, ImageTask
-from ahf_ros.detectors.evidence import Reading
+from ahf_ros.families.evidence import Reading
 from ahf_ros.prints.families import AUTO
 from ahf_ros.session_settings import IdentificationSettings
 from ahf_ros.settling import FIRST, evident_together

@@ -33,7 +33,7 @@ from ahf_ros.cli.options import (
 )
 from ahf_ros.clouds.cloud_settings import CloudSettings
 from ahf_ros.clouds.registration_settings import RegistrationSettings
-from ahf_ros.detectors import is_foreign
+from ahf_ros.families import is_foreign
 from ahf_ros.session_settings import IdentificationSettings, StackSettings
 
 if TYPE_CHECKING:

@@ -122,7 +122,7 @@ def _run(options: argparse.Namespace, output: TextIO | None) -> int:
     from ahf_ros.batch.identification import identify_images
     from ahf_ros.batch.results import Unwritable
     from ahf_ros.batch.settling import settled_tasks
-    from ahf_ros.detectors import is_foreign
+    from ahf_ros.families import is_foreign
     from ahf_ros.network.export.survey import measured_image
 
     failed = bool(problems)
@@ -197,7 +197,7 @@ def check_settings(settings: IdentificationSettings) -> None:
     A detector of another package is made where it works only, in a process of its own.
     """
     from ahf_ros.batch.identification import detector_of
-    from ahf_ros.detectors import is_foreign
+    from ahf_ros.families import is_foreign
     from ahf_ros.session import create_identifier
 
     if not is_foreign(settings.detector):
@@ -230,7 +230,7 @@ def _hint(settings: IdentificationSettings, identified: int) -> list[str]:
     if settings.number or settings.estimate_expected or settings.adaptive.listed:
         return []
 
-    from ahf_ros.detectors import EarlyStopping
+    from ahf_ros.families import EarlyStopping
 
     if isinstance(detector_of(settings), EarlyStopping):  # filters show it hardly more
         return []

@@ -17,14 +17,14 @@ from ahf_ros.base.writing import write_files, write_whole
 from ahf_ros.cli import say, tell
 from ahf_ros.cli.identify import image_paths
 from ahf_ros.cli.options import add_option, input_name, output_path
-from ahf_ros.detectors.contract import DetectorSettings
+from ahf_ros.families.contract import DetectorSettings
 
 if TYPE_CHECKING:
     import numpy as np
 
-    from ahf_ros.detectors.learning.points import Learnt
-    from ahf_ros.detectors.learning.rings import LearntFamily
-    from ahf_ros.detectors.ring.bands import Bands
+    from ahf_ros.families.learning.points import Learnt
+    from ahf_ros.families.learning.rings import LearntFamily
+    from ahf_ros.families.ring.bands import Bands
     from ahf_ros.prints.gsi import PointFamily
 
 _OF_DOTS = 'polarity', 'min_radius', 'max_radius'  # options
@@ -95,8 +95,8 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _learn_rings(options: argparse.Namespace) -> int:
-    from ahf_ros.detectors.learning.rings import learn_families
-    from ahf_ros.detectors.ring.bands import MINIMUM_TARGETS, Bands, find_bands
+    from ahf_ros.families.learning.rings import learn_families
+    from ahf_ros.families.ring.bands import MINIMUM_TARGETS, Bands, find_bands
     from ahf_ros.files.image_files import read_image
 
     paths, problems, left_out = image_paths(options.sources)
@@ -211,7 +211,7 @@ def _contact_sheet(learnt: LearntFamily, crops: dict[bytes, np.ndarray]) -> np.n
 
 
 def _learn_points(options: argparse.Namespace, points: str) -> int:
-    from ahf_ros.detectors.learning.points import learn_family, library_text, with_codes
+    from ahf_ros.families.learning.points import learn_family, library_text, with_codes
     from ahf_ros.files.tables import read_points
     from ahf_ros.prints.gsi import point_family
 

@@ -13,8 +13,8 @@ from ahf_ros import msg
 from ahf_ros.advice import Adviser
 from ahf_ros.base.target import Identification
 from ahf_ros.base.text import counted, listed
-from ahf_ros.detectors import Detector, create_detector
-from ahf_ros.detectors.contract import Unavailable
+from ahf_ros.families import Detector, create_detector
+from ahf_ros.families.contract import Unavailable
 from ahf_ros.files.target_messages import coded_target_array, unanswered
 from ahf_ros.filtering.homomorphic import filtered
 from ahf_ros.msg import CodedTargetArray

@@ -49,7 +49,7 @@ class ServiceDetector:
         self._known = False  # whether the service has answered since it was there
 
     def __call__(self, image: np.ndarray) -> list[Target]:
-        """Identify the targets of an 8-bit gray image; see `ahf_ros.detectors.Detector`.
+        """Identify the targets of an 8-bit gray image; see `ahf_ros.families.Detector`.
 
         Raises a ValueError that names the service if it does not exist, disappears, exceeds its
         time limit or refuses the image, and `Stopping` if the node stops first.

@@ -12,7 +12,7 @@ from ahf_ros.base.settings.parameter import check_parameters, parameter
 from ahf_ros.base.text import printable, shown
 from ahf_ros.clouds.cloud_settings import MAXIMUM_TOLERANCE, CloudSettings
 from ahf_ros.clouds.registration_settings import RegistrationSettings, check_frame, unit_parameter
-from ahf_ros.detectors import DETECTOR, detector_name
+from ahf_ros.families import DETECTOR, detector_name
 from ahf_ros.nodes.patience import CONTINUOUS, TRIGGERED, UNKNOWN
 from ahf_ros.prints.families import prints_of
 from ahf_ros.scenes.scene import SceneSettings

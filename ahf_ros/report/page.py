@@ -34,7 +34,7 @@ from ahf_ros.base.target import (
 )
 from ahf_ros.base.text import printable, reason_of
 from ahf_ros.base.writing import whole_file
-from ahf_ros.detectors.contract import DetectorSettings
+from ahf_ros.families.contract import DetectorSettings
 from ahf_ros.files.html_pages import page_script, page_style, page_template, script_json
 from ahf_ros.prints.families import AUTO, prints_in
 from ahf_ros.report.images import Picture, fitted, shown_image, thumbnail

@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ahf_ros.base.target import Target, TrueTarget
-from ahf_ros.detectors import DetectorSettings
+from ahf_ros.families import DetectorSettings
 from ahf_ros.prints import RING_NAMES
 from ahf_ros.prints.ring import FAMILY_NAMES, family, ring_family
 from ahf_ros.scenes.bent.picture import render_bent

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ahf_ros.base.target import DottedTarget
-from ahf_ros.detectors import create_detector
+from ahf_ros.families import create_detector
 from ahf_ros.prints.gsi import GSI_LIBRARY, point_family
 from ahf_ros.scenes.patterns import LIGHT_NAMES
 from ahf_ros.scenes.scene import Rendering, SceneSettings

@@ -21,7 +21,7 @@ from ahf_ros.bag.definitions import IMAGE, typestore
 from ahf_ros.bag.output import finished
 from ahf_ros.bag.run import BagTask, answer_bag
 from ahf_ros.bag.source import Source
-from ahf_ros.detectors import DetectorSettings
+from ahf_ros.families import DetectorSettings
 from ahf_ros.filtering.settings import AdaptiveSettings
 from ahf_ros.session_settings import IdentificationSettings
 from support import bags, mcap

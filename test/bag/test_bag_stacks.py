@@ -12,7 +12,7 @@ pytest.importorskip('rosbags', reason='rosbags is not installed')
 from ahf_ros.bag.definitions import IMAGE, typestore
 from ahf_ros.bag.run import BagTask, answer_bag
 from ahf_ros.cli import main
-from ahf_ros.detectors import DetectorSettings
+from ahf_ros.families import DetectorSettings
 from ahf_ros.scenes.scene import SceneSettings, render
 from ahf_ros.session_settings import IdentificationSettings, StackSettings
 from support import bags

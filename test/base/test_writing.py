@@ -44,7 +44,7 @@ MAY_WRITE = {
     'bag/mcap_records.py': 'checksums in a bag that has not its place yet',
     'batch/results.py': 'lines behind those that are there, see test_results.py',
     'cli/__init__.py': 'the device null',
-    'detectors/external/command.py': 'the image for a program, in a folder of its own',
+    'families/external/command.py': 'the image for a program, in a folder of its own',
 }
 
 

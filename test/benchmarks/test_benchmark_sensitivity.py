@@ -20,7 +20,7 @@ from benchmarks.sensitivity import (
     written,
 )
 
-CERTAIN = 'ahf_ros.detectors.ring.hypotheses.CERTAIN'
+CERTAIN = 'ahf_ros.families.ring.hypotheses.CERTAIN'
 SCALE = 'ahf_ros.vision.profiles.USUAL_BLUR'  # circle_fit imports it
 PAIR = 'ahf_ros.vision.log_edges._STRONG_EDGE'  # one of two in a line
 SCENE = SceneSettings(width=480, height=320, targets=3, dot_radius=9.0)
@@ -72,7 +72,7 @@ def test_the_table_shows_what_changed() -> None:
     )
     assert lines.splitlines()[-2:] == [
         '| none changed |  | 9 (0.010) | 9 (0.010) |',
-        '| `detectors.ring.hypotheses.CERTAIN` | 0.98 | fails | 8, 1 wrong |',
+        '| `families.ring.hypotheses.CERTAIN` | 0.98 | fails | 8, 1 wrong |',
     ]
 
 

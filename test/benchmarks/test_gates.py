@@ -25,7 +25,7 @@ from benchmarks.gates import (
     written,
 )
 
-CLOSED = Gate('every word', 'detectors.ring.hypotheses:CERTAIN', '1.1')
+CLOSED = Gate('every word', 'families.ring.hypotheses:CERTAIN', '1.1')
 NO_MATTER = Gate('blobs of few pixels', 'vision.small_dots:_MINIMUM_PIXELS', '1')
 SCENE = SceneSettings(width=480, height=320, targets=3, dot_radius=9.0)
 
@@ -60,7 +60,7 @@ def test_a_gate_that_drops_all_targets_loses_them(folder: Path, named: dict[str,
     cells = row(CLOSED, made, 1, 1)
     assert cells[:6] == (
         'every word',
-        '`detectors.ring.hypotheses:CERTAIN`',
+        '`families.ring.hypotheses:CERTAIN`',
         '`0.75`',
         '`1.1`',
         '3',
@@ -89,8 +89,8 @@ def test_a_detector_that_an_open_gate_breaks_has_no_pictures(
 def test_names_lie_in_modules_functions_and_tuples() -> None:
     assert value_of('vision.ellipses:_MINIMUM_STEP') == '0.1'
     assert value_of('vision.ellipses:_INLIER') == '0.06'  # one of two in a line
-    assert value_of('detectors.ring.contests:resolve') == 'a function'
-    assert value_of('detectors.ring.contests:resolve.kept') == 'owners(len(ids), on_it)'
+    assert value_of('families.ring.contests:resolve') == 'a function'
+    assert value_of('families.ring.contests:resolve.kept') == 'owners(len(ids), on_it)'
     for missing in (
         'vision.ellipses:_NO',
         'vision.no:_MINIMUM_STEP',

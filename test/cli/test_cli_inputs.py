@@ -103,7 +103,7 @@ def test_coordinates_are_those_of_stored_pixels_unless_upright_is_said(
 def test_options_are_known_without_what_computes() -> None:
     code = (
         'import sys; from ahf_ros.cli import commands; commands._parser([]); '
-        'listed = "ahf_ros.detectors" in sys.modules; '
+        'listed = "ahf_ros.families" in sys.modules; '
         'commands._parser(["identify"]).format_help(); '
         'print(listed, [name for name in ("numpy", "cv2", "rich") if name in sys.modules])'
     )

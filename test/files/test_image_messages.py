@@ -15,7 +15,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ahf_ros.detectors import create_detector
+from ahf_ros.families import create_detector
 from ahf_ros.files.image_messages import (
     ENCODINGS,
     WITH_PLANES,

@@ -19,7 +19,7 @@ from ahf_ros.base.target import (
     Target,
     UndecodedTarget,
 )
-from ahf_ros.detectors.ring.hypotheses import CERTAIN
+from ahf_ros.families.ring.hypotheses import CERTAIN
 from ahf_ros.files.target_json import read_results, targets_from_json, to_json
 from ahf_ros.prints.families import prints_in
 from support.scenes import rendered

@@ -22,7 +22,7 @@ from ahf_ros import msg
 from ahf_ros.base.target import UNDECODED, Identification, Target
 from ahf_ros.clouds.localisation import Positions
 from ahf_ros.clouds.point_clouds import COVARIANCE
-from ahf_ros.detectors import create_detector
+from ahf_ros.families import create_detector
 from ahf_ros.files.target_messages import coded_target_array
 from ahf_ros.msg import CodedTarget, CodedTargetArray
 from ahf_ros.network.camera import rotation_matrices

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ahf_ros.detectors.learning.points import library_text, with_codes
+from ahf_ros.families.learning.points import library_text, with_codes
 from ahf_ros.prints.gsi import GSI_LIBRARY, Rule, point_family, positions_of, valid_words, value_of
 
 KNOWN = {

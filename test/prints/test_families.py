@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ahf_ros.detectors import DetectorSettings
+from ahf_ros.families import DetectorSettings
 from ahf_ros.prints import ring
 from ahf_ros.prints.dots import DOTS_DESIGN
 from ahf_ros.prints.families import (

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ahf_ros.detectors.gsi.published import area_cross_ratio, p2_invariant, template_invariant
+from ahf_ros.families.published.gsi import area_cross_ratio, p2_invariant, template_invariant
 from ahf_ros.prints.gsi import point_family
 
 # Table 3, px. A is printed as (2047.00, 1072.58), where two digits changed places.

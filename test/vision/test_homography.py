@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ahf_ros.detectors.gsi.refinement import ellipse_centres
+from ahf_ros.families.gsi.refinement import ellipse_centres
 from ahf_ros.vision.frame import ellipse_axes, project
 from ahf_ros.vision.homography import fit_homographies, local_frames
 

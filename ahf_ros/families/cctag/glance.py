@@ -1,0 +1,224 @@
+"""A glance at the mean profiles about circles, by which most of them are none of a CCTag.
+
+Gray values about a circle are read once, for outermost circles of all radii about its centre, of
+all families and colours: the mean profile of each is a part of what is read.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from ahf_ros.families.cctag.rays import ANGLES, PROFILE
+from ahf_ros.families.cctag.templates import (
+    CLIPPED,
+    SIZE_STEP,
+    Edge,
+    by_value,
+    discs,
+    less_lines,
+    size_steps,
+    templates,
+    totals,
+)
+from ahf_ros.prints.cctag import CircleFamily
+from ahf_ros.vision import frame
+from ahf_ros.vision.array_record import ArrayRecord
+from ahf_ros.vision.dots import Dots
+from ahf_ros.vision.sampling import sample_circles
+
+_EVERY = 2  # one of so many angles and radii is looked at
+_EDGES: tuple[Edge, ...] = (
+    *((0.0, 0.9, more, 0.0) for more in (0.0, 1.0)),
+    *((shift, 0.9, 0.0, share) for shift in (-0.4, 0.0) for share in CLIPPED),
+)  # of dark ink
+_DEFOCUSED = 0.6  # blur, widths of narrow rings
+_INNERMOST, _RATIO = 0.12, 1.035  # radius from which an outermost circle is read, and to the next
+_OUTERMOST = range(-3, 2)  # steps of the radius to that of the outermost circle, where it is found
+_NARROWEST = 0.5  # ring that is read, px; blur hides others
+_PROMISING = 0.6  # share of a profile that rings explain, from which they are looked at
+_OF_DISCS = 0.9  # of 1, so that of rings in one place those that leave least are looked at
+_LOOKED_AT = 2  # frames for an ID, at the most
+_APART = 0.1  # distance of the centres of different frames, radii
+_LEAST_UNLIKE = 1e-6  # of squares of gray values, of their mean
+_READ = 128  # circles that are read at a time
+_PART = 4096  # circles that are looked at at a time, which bounds the memory
+LARGEST = 1 / 0.15
+"""Radius of the outermost circle, in radii of any other."""
+_STEPS = np.arange(_OUTERMOST[0], math.ceil(math.log(LARGEST, SIZE_STEP)) + 1)
+"""Steps of the radius of a circle to that of the outermost circle."""
+_BOUNDS = _INNERMOST * SIZE_STEP ** _STEPS[0], PROFILE[-1] * SIZE_STEP ** _STEPS[-1]
+_RADII = np.geomspace(*_BOUNDS, math.ceil(math.log(_BOUNDS[1] / _BOUNDS[0], _RATIO)))
+"""Radii of profiles about circles."""
+
+_Likely = tuple[np.ndarray, np.ndarray]  # frames (k, 3, 3), and how much likelier than discs
+
+
+@dataclass(frozen=True, slots=True)
+class Circles(ArrayRecord):
+    """Circles, and mean profiles about them."""
+
+    frames: np.ndarray  # (k, 3, 3)
+    polarity: np.ndarray  # int, (k,), 0 if it is unknown
+    octave: np.ndarray  # int, (k,), the number of that in whose px they are
+    highest: np.ndarray  # int, (k,), steps to the largest outermost circle
+    profiles: np.ndarray  # float32, (k, n), of rays in their own light, most of like ones
+
+    @staticmethod
+    def at(gray: np.ndarray, dots: Dots, octave: int = 0, largest: float = LARGEST) -> Circles:
+        """Return the circles of dots; outermost circles may be up to so many times larger."""
+        highest = math.ceil(math.log(largest, SIZE_STEP))
+        radii = _RADII[: np.searchsorted(_RADII, PROFILE[-1] * SIZE_STEP**highest) + 1]
+        count, own = len(dots.frames), int(np.searchsorted(radii, PROFILE[-1]))
+        share = np.gradient(radii[:own]).astype(np.float32)
+        profiles = np.zeros((count, len(_RADII)), np.float32)
+        for start in range(0, count, _READ):
+            part = slice(start, start + _READ)
+            seen = sample_circles(gray, dots.frames[part], ANGLES[::_EVERY], radii)
+            np.maximum(seen, 0, out=seen)
+            seen /= np.maximum(seen[..., :own] @ share / share.sum(), 1)[..., None]
+            unlike = (seen[..., :own] - seen[..., :own].mean(axis=1, keepdims=True)) ** 2 @ share
+            weight = 1 / (unlike + np.median(unlike, axis=1, keepdims=True) + _LEAST_UNLIKE)
+            profiles[part, : len(radii)] = (weight[:, None] @ seen)[:, 0]
+        octaves, steps = (np.full(count, of) for of in (octave, highest))
+        return Circles(dots.frames, dots.polarity, octaves, steps, profiles)
+
+
+@dataclass(frozen=True, slots=True)
+class _Outermost(ArrayRecord):
+    """Outermost circles that targets of circles may have."""
+
+    circle: np.ndarray  # int, (k,), row
+    octave: np.ndarray  # int, (k,), as that of the circle
+    sign: np.ndarray  # int, (k,), the polarity, or 0 if it is unknown
+    factor: np.ndarray  # (k,), of the radius
+    radius: np.ndarray  # (k,), mean, px
+    profiles: np.ndarray  # float32, (k, m), weighted
+
+    @staticmethod
+    def of(circles: Circles, radii: Sequence[tuple[float, float]]) -> _Outermost:
+        """Return those whose semi-major axes are within the radii, px, of their octaves."""
+        low, high = np.array(radii)[circles.octave].T[..., None]
+        major = frame.ellipse_axes(circles.frames)[0][:, None] * SIZE_STEP**_STEPS
+        tried = (major >= low) & (major <= high) & (circles.highest[:, None] >= _STEPS)
+        row, step = np.nonzero(tried)
+        factor = SIZE_STEP ** _STEPS[step]
+        resampled = circles.profiles @ _resampling()
+        resampled = resampled.reshape(*tried.shape, len(PROFILE[::_EVERY]))
+        return _Outermost(
+            circle=row,
+            octave=circles.octave[row],
+            sign=circles.polarity[row] * np.where(_STEPS[step] < _OUTERMOST.stop, 1, -1),
+            factor=factor,
+            radius=frame.mean_radii(circles.frames)[row] * factor,
+            profiles=resampled[row, step],
+        )
+
+    def better(self, polarity: int, family: CircleFamily) -> np.ndarray:
+        """Return how much likelier the rings of a family are than discs, (k,), 0 if unlikely."""
+        narrow = family.narrow * self.radius
+        tried = np.flatnonzero((narrow >= _NARROWEST) & (self.sign * polarity >= 0))
+        sharp = tuple((polarity * of[0], *of[1:3], polarity * of[3]) for of in _EDGES)
+        better = np.zeros(len(narrow))
+        for size, of_size in by_value(size_steps(self.radius[tried])):
+            some = tried[of_size]
+            profiles = polarity * self.profiles[some]
+            found = _better(profiles, family, size, sharp)
+            soft = _DEFOCUSED * family.narrow * SIZE_STEP**size
+            if soft > _EDGES[0][1]:
+                left = np.flatnonzero(found == 0)
+                defocused = ((0.0, soft, 0.0, 0.0),)
+                # Those in focus come first.
+                found[left] = 0.5 * _better(profiles[left], family, size, defocused)
+            better[some] = found
+        return better * self.radius
+
+
+@lru_cache(maxsize=1)
+def _resampling() -> np.ndarray:
+    """Return what makes weighted profiles of circles of all steps of radii, (n, steps m)."""
+    at = PROFILE[::_EVERY] * SIZE_STEP ** _STEPS[:, None]
+    places = np.log(at / _RADII[0]) / math.log(_RADII[1] / _RADII[0])
+    last = len(_RADII) - 1
+    away = np.abs(places.clip(0, last)[..., None] - np.arange(last + 1))
+    resampled = less_lines(np.maximum(1 - away, 0).swapaxes(1, 2), _EVERY)
+    return np.ascontiguousarray(resampled.swapaxes(0, 1).reshape(len(_RADII), -1))
+
+
+@lru_cache(maxsize=512)
+def _templates(
+    family: CircleFamily, size: int, edges: tuple[Edge, ...]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return templates of rings and of discs; all sizes of both families have their place."""
+    return templates(family, size, edges, _EVERY)[0], discs(size, edges, _EVERY)
+
+
+def _better(
+    profiles: np.ndarray, family: CircleFamily, size: int, edges: tuple[Edge, ...]
+) -> np.ndarray:
+    """Return by how much less of profiles, (k, n), rings leave than discs, ln, (k,).
+
+    It is 0 of what is not like rings.
+    """
+    of_rings, of_any_disc = _templates(family, size, edges)
+    better = np.zeros(len(profiles))
+    total = totals(profiles)
+    share = np.minimum((profiles @ of_rings.T).min(axis=1), 0) ** 2 / total  # ink is dark
+    likely = np.flatnonzero(share >= _PROMISING)
+    if not len(likely):
+        return better
+    of_discs = np.abs(profiles[likely] @ of_any_disc.T).max(axis=1) ** 2 / total[likely]
+    less = _OF_DISCS * np.log1p(-of_discs) - np.log1p(-share[likely])
+    better[likely] = np.where(share[likely] > of_discs, less, 0)
+    return better
+
+
+def likely_rings(
+    circles: Circles,
+    radii: Sequence[tuple[float, float]],
+    kinds: Sequence[tuple[int, CircleFamily]],
+) -> list[list[np.ndarray]]:
+    """Return the frames of outermost circles whose mean profile looks like rings, (k, 3, 3) each.
+
+    They are those of octaves, and in each of kinds: polarities and families. The bounds of octaves
+    are those of the semi-major axis, px. An ID is there once, so that some times as many frames
+    are enough, those that are most like rings and least like discs.
+    """
+    found: list[list[list[_Likely]]] = [[[] for _ in kinds] for _ in radii]
+    order = np.argsort(frame.mean_radii(circles.frames), kind='stable')
+    for start in range(0, max(len(order), 1), _PART):
+        part = circles.select(order[start : start + _PART])
+        tried = _Outermost.of(part, radii)
+        for number, kind in enumerate(kinds):
+            better = tried.better(*kind)
+            for octave, of_octave in enumerate(found):
+                some = np.flatnonzero((better != 0) & (tried.octave == octave))
+                frames = frame.scaled(part.frames[tried.circle[some]], tried.factor[some])
+                of_octave[number].append((frames, better[some]))
+    return [
+        [
+            _best(parts, _LOOKED_AT * len(kind[1].numbers))
+            for parts, kind in zip(of, kinds, strict=True)
+        ]
+        for of in found
+    ]
+
+
+def _best(parts: Sequence[_Likely], most: int) -> np.ndarray:
+    """Return the best frames of different places."""
+    frames, better = (np.concatenate(of) for of in zip(*parts, strict=True))
+    size, centres = frame.mean_radii(frames), frames[:, :2, 2]
+    kept: list[int] = []
+    free = np.ones(len(size), bool)
+    for index in np.argsort(-better, kind='stable').tolist():
+        if len(kept) == most:
+            break
+        if free[index]:
+            away = np.hypot(*(centres - centres[index]).T)
+            free &= away >= _APART * np.maximum(size, size[index])
+            kept.append(index)
+    return frames[kept]

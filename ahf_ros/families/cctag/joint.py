@@ -1,0 +1,210 @@
+"""The rings of CCTags and the light on them, fitted to pixels together.
+
+Rays know the light before the rings, and divide by it what the lens has mixed, which costs half of
+the precision where targets are small, and doubts. Here the frame, the edges of the print and those
+of light are fitted to the pixels at once, for the place of targets and for doubtful IDs.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from operator import itemgetter
+
+import numpy as np
+
+from ahf_ros.families.cctag.fit import Fit, Usual, fitted
+from ahf_ros.families.cctag.light import EDGES, Lights
+from ahf_ros.families.cctag.patch import Patch
+from ahf_ros.families.cctag.rings import Aligned, Prior, align, likely_ids
+from ahf_ros.families.cctag.templates import MAXIMUM_SHIFT, signed_circles
+from ahf_ros.prints import CCTAG_NAMES
+from ahf_ros.prints.cctag import CircleFamily, circle_family
+from ahf_ros.vision import frame
+from ahf_ros.vision.image import GAMMA, as_light
+
+_LARGEST = 32.0  # px: rays place the rings of larger targets as well, and much faster
+_TELLING = 16  # targets that tell what is usual
+_LARGER = 0.9  # quantile of errors that tell which model is right
+_FEWEST = 60  # pixels that are fitted
+_UNUSUAL = 2.0  # deviations of a misfit, from which other light and other IDs are tried
+_MOST_UNUSUAL = 5.0  # the same, up to which the place is that of the rings
+_HOPELESS = 12.0  # the same, from which no ID is tried
+_CERTAIN, _ENOUGH = 0.98, 4  # confidence of targets that tell of doubtful ones, and their number
+_PROBABLE = 0.75  # probability of a target, from which it is placed
+_POSSIBLE, _MOST = 0.05, 128  # the same, from which it is read again, and number of these
+_RIVALS = 12  # IDs that rays may show
+_ODDS, _LESS = 6.0, 2.0  # ln of the odds of a target that is usual, less by each deviation
+_OF_MARGIN = 0.1  # share of ln of the odds of IDs, by pixels, that is believed
+
+
+def jointly(gray: np.ndarray, rings: Aligned, family: CircleFamily) -> Aligned:
+    """Return rings (k,) that are in place to a part of a px, with places that pixels give.
+
+    Large ones, and those that the model does not explain as well as others, stay as they are.
+    """
+    small = np.flatnonzero(_small(rings))
+    if not len(small):
+        return rings
+    own = rings.select(small)
+    scene = _Scene.of(gray, own, family)
+    for row, fit in scene.fits(own).items():
+        placed = scene.placed(own.select(slice(row, row + 1)), fit)
+        rings = rings.replaced(small[row : row + 1], placed)
+    return rings
+
+
+def contested(gray: np.ndarray, rings: Aligned, polarity: int, family: CircleFamily) -> Aligned:
+    """Return readings (k,) with the places that pixels give; what is in doubt is as pixels show.
+
+    Doubts need enough certain targets, which tell how well rings are seen in this image.
+    """
+    enough = (_small(rings) & (rings.confidence >= _CERTAIN)).sum() >= _ENOUGH
+    least = _POSSIBLE if enough else _PROBABLE
+    which = np.flatnonzero(_small(rings) & (rings.of_target >= least))
+    if not len(which):
+        return rings
+    which = which[np.argsort(-rings.of_target[which], kind='stable')[:_MOST]]
+    own = rings.select(which)
+    certain = own.confidence >= _CERTAIN
+    scene = _Scene.of(gray, own.select(certain) if enough else own, family)
+    for row, fit in scene.fits(own).items():
+        reading = own.select(slice(row, row + 1))
+        unusual = scene.usual.unusual(fit)
+        if enough and not (certain[row] and unusual <= _UNUSUAL):
+            doubt = unusual > _UNUSUAL or reading.of_id[0] < _CERTAIN
+            if doubt and unusual < _HOPELESS:
+                reading, fit = scene.likeliest(reading, polarity, fit)
+            reading = replace(reading, by_pixels=scene.odds(fit))
+        rings = rings.replaced(which[row : row + 1], scene.placed(reading, fit))
+    return rings
+
+
+def _small(rings: Aligned) -> np.ndarray:
+    return frame.ellipse_axes(rings.frames)[0] <= _LARGEST
+
+
+@dataclass(frozen=True, slots=True)
+class _Scene:
+    """An image, its light, and what is known of its targets."""
+
+    gray: np.ndarray
+    light: np.ndarray  # of the gray values, whose gamma is the next
+    gamma: float
+    family: CircleFamily
+    usual: Usual
+
+    @staticmethod
+    def of(gray: np.ndarray, rings: Aligned, family: CircleFamily) -> _Scene:
+        """Return an image with what the likeliest of targets tell, gamma with it."""
+        telling = rings.select(np.argsort(-rings.plain, kind='stable')[:_TELLING])
+        tried = [
+            _Scene(gray, light, gamma, family, Usual())._told(telling)
+            for light, gamma in ((gray, 1.0), (as_light(gray), GAMMA))
+        ]
+        return min(tried, key=itemgetter(1))[0]
+
+    def fits(self, rings: Aligned) -> dict[int, Fit]:
+        """Return what forms the pixels of targets, by their rows, where enough are known.
+
+        Where the pixels are unlike what is usual, light of fewer edges is tried.
+        """
+        fits: dict[int, Fit] = {}
+        rows, worse = np.arange(len(rings.ids)), self.usual.unusual
+        for most in range(EDGES, 0, -1):
+            for row, fit in zip(rows.tolist(), self._fits(rings.select(rows), most), strict=True):
+                if fit and (row not in fits or worse(fit) < worse(fits[row])):
+                    fits[row] = fit
+            unusual = [row for row, fit in fits.items() if worse(fit) > _UNUSUAL]
+            rows = np.array(unusual, int)
+        return fits
+
+    def _fits(self, rings: Aligned, most: int = EDGES) -> list[Fit | None]:
+        fits: list[Fit | None] = []
+        rings, lights = self._aligned(rings, self.usual.camera, most)
+        most_shift = MAXIMUM_SHIFT * self.family.narrow
+        for row, circles in enumerate(signed_circles(self.family, rings.ids)):
+            own, light = (rings.select(slice(row, row + 1)), lights.select(slice(row, row + 1)))
+            patch = Patch.about(self.gray, own, circles, light, self.gamma, most_shift)
+            if len(patch.seen) > _FEWEST:
+                first = self.usual.first(patch.first(own, light))
+                fits.append(fitted(patch, first, self.usual))
+            else:
+                fits.append(None)
+        return fits
+
+    def placed(self, rings: Aligned, fit: Fit) -> Aligned:
+        """Return the rings of a target, (1,), where a good fit is."""
+        if self.usual.unusual(fit) > _MOST_UNUSUAL:
+            return rings
+        return replace(
+            rings,
+            frames=fit.formed.frame[None],
+            covariance=fit.of_centre[None],
+            shift=np.array([fit.formed.shift]),
+            blur=np.array([fit.formed.blur_of_rays]),
+        )
+
+    def odds(self, fit: Fit) -> np.ndarray:
+        """Return ln of the odds that a fit is of a target, (1,)."""
+        odds = _ODDS - _LESS * max(self.usual.unusual(fit), 0.0)
+        return np.array([max(odds, -_ODDS)])
+
+    def likeliest(self, rings: Aligned, polarity: int, fit: Fit) -> tuple[Aligned, Fit]:
+        """Return the reading of a target, (1,), that pixels show, and its fit.
+
+        Of IDs that rays may show, and those that differ in one ring or in all, the likeliest is
+        taken. That is repeated for this one until it stays. IDs of other families are rivals.
+        """
+        fits = {int(rings.ids[0]): fit} | self._rivals(rings, polarity, fit)
+        every = len(self.family.numbers) - 1
+        while True:
+            best = min(fits, key=lambda it: fits[it].cost(self.usual))
+            flips = [1 << bit for bit in range(every.bit_length())]
+            others = [best ^ flip for flip in (*flips, every) if best ^ flip not in fits]
+            if not others:
+                break
+            circles = signed_circles(self.family, np.array(others))
+            for other, of in zip(others, circles, strict=True):
+                patch = replace(fit.patch, circles=of)
+                fits[other] = fitted(patch, fits[best].formed, self.usual)
+        fit = fits.pop(best)
+        rivals = list(fits.values())
+        for name in CCTAG_NAMES:
+            if name != self.family.name:
+                scene = replace(self, family=circle_family(name))
+                rivals += scene._rivals(rings, polarity, fit).values()
+        margin = min(rival.cost(self.usual) for rival in rivals) - fit.cost(self.usual)
+        reading = replace(rings, ids=np.array([best]), margin=np.array([_OF_MARGIN * margin]))
+        return reading, fit
+
+    def _rivals(self, rings: Aligned, polarity: int, fit: Fit) -> dict[int, Fit]:
+        """Return fits of a target, (1,), by the IDs that rays may show besides."""
+        lights, camera = Lights.about(self.light, rings.frames), self.usual.camera
+        starts, ids, *_ = likely_ids(self.light, lights, polarity, self.family, camera, _RIVALS)
+        numbers, first = np.unique(ids[0], return_index=True)
+        larger = frame.mean_radii(starts[0, first]) / frame.mean_radii(rings.frames)
+        begun = frame.scaled(np.repeat(fit.formed.frame[None], len(first), axis=0), larger)
+        circles = signed_circles(self.family, numbers)
+        return {
+            number: fitted(
+                replace(fit.patch, circles=of), replace(fit.formed, frame=start), self.usual
+            )
+            for number, of, start in zip(numbers.tolist(), circles, begun, strict=True)
+        }
+
+    def _told(self, rings: Aligned) -> tuple[_Scene, float]:
+        """Return what targets tell, and the usual error of gray values."""
+        usual = replace(self.usual, camera=Prior().of_camera(self._aligned(rings, Prior())[0]))
+        scene = replace(self, usual=usual)
+        fits = list(scene.fits(rings).values())
+        if not fits:
+            return scene, math.inf
+        errors = np.abs(np.concatenate([of.errors for of in fits]))
+        return replace(scene, usual=usual.after(fits)), float(np.quantile(errors, _LARGER))
+
+    def _aligned(self, rings: Aligned, camera: Prior, most: int = EDGES) -> tuple[Aligned, Lights]:
+        """Return rings that are brought onto the image, and the lights about them."""
+        lights = Lights.about(self.light, rings.frames, most)
+        edges, family = rings.edges, self.family
+        return align(self.light, rings.frames, rings.ids, edges, family, camera, lights), lights

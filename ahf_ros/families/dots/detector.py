@@ -1,0 +1,119 @@
+"""Identification of rings of dots that light does not break.
+
+Discs are found as all dots are, and by their borders; disc and border are fitted together to a
+projective frame, in which the evidence for a dot at each place of the ring gives the code word.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar
+
+import numpy as np
+
+from ahf_ros.base.blas import one_blas_thread
+from ahf_ros.base.target import DottedTarget, Target, sorted_targets
+from ahf_ros.families.claims import reported
+from ahf_ros.families.contract import DetectorSettings, FamilyDetector, moved_targets
+from ahf_ros.families.dots.discs import judged, small_discs, voted_discs, whole_discs
+from ahf_ros.families.dots.rings import CERTAIN, Rings, fit_targets, likely_targets, read_discs
+from ahf_ros.prints.dots import DotFamily
+from ahf_ros.vision.ellipse_targets import ellipse_fields
+from ahf_ros.vision.frame import affine_frames, ellipse_axes
+from ahf_ros.vision.image import as_gray, check_image
+from ahf_ros.vision.large_targets import targets_of_octaves
+from ahf_ros.vision.pyramid import ImagePyramid, Octave, image_pyramid
+
+_PLAUSIBLE = 0.5  # share of the edges of disc and border
+_MAXIMUM_MOVE, _MAXIMUM_MOVE_SHARE = 1.0, 0.2  # that a centre is moved: px, radii
+
+
+@dataclass(frozen=True, slots=True)
+class DotsDetector(FamilyDetector):
+    """Identify rings of dots."""
+
+    name: ClassVar[str] = 'dots'
+    patience: ClassVar[int] = 3
+
+    @property
+    def design(self) -> DotFamily:
+        """Printed design of the family."""
+        return self.settings.codes(DotFamily)[0]
+
+    def __call__(self, image: np.ndarray) -> list[Target]:
+        """Identify the targets of one image; see `Detector`."""
+        check_image(image)
+        return self.search(image_pyramid(as_gray(image), self.settings.max_radius))
+
+    @one_blas_thread()
+    def search(self, pyramid: ImagePyramid) -> list[Target]:
+        """Identify the targets of one image; see `Searching`."""
+        found = targets_of_octaves(pyramid, self.settings.radii, self._identify, self.refine)
+        everything, reach = self.settings.report_undecoded, self.design.border_radius
+        return sorted_targets(
+            reported(found, reach, CERTAIN, everything=everything, contested=self.contested)
+        )
+
+    @one_blas_thread()
+    def refine(self, image: np.ndarray, targets: Sequence[Target]) -> list[Target]:
+        """Return targets with the places that disc and border have in an image; see `Refiner`.
+
+        Targets other than `DottedTarget`, and those whose disc and border are not found near to
+        where they should be, stay as they are.
+        """
+        check_image(image)
+        dotted = [target for target in targets if isinstance(target, DottedTarget)]
+        if not dotted:
+            return list(targets)
+        columns = [(it.x, it.y, it.semi_major, it.semi_minor, it.angle) for it in dotted]
+        start = affine_frames(*np.array(columns).T)
+        polarity = np.array([target.polarity for target in dotted])
+        gray = as_gray(image).astype(np.float32, copy=False)
+        fit = fit_targets(gray, start, polarity, self.design)
+        moved = np.hypot(*(fit.frames[:, :2, 2] - start[:, :2, 2]).T)
+        reach = np.maximum(_MAXIMUM_MOVE, _MAXIMUM_MOVE_SHARE * ellipse_axes(start)[1])
+        good = (fit.share >= _PLAUSIBLE) & (moved <= reach)
+        changes = fit.frames @ np.linalg.inv(start)
+        places = [
+            {**place, 'dots': _moved(target, change)}
+            for target, change, place in zip(
+                dotted,
+                changes,
+                ellipse_fields(fit.frames, fit.covariance, fit.growth),
+                strict=True,
+            )
+        ]
+        return moved_targets(targets, dotted, places, good)
+
+    def _identify(self, octave: Octave) -> list[DottedTarget]:
+        """Return the targets of an octave, in its pixels."""
+        low, high = octave.radii
+        settings = replace(self.settings, min_radius=low, max_radius=high)
+        code = self.design
+        rings = find_rings(octave.pyramid, settings, code, self.expected)
+        return likely_targets(rings, settings, code) if len(rings.words) else []
+
+
+def find_rings(
+    pyramid: ImagePyramid,
+    settings: DetectorSettings,
+    code: DotFamily,
+    expected: frozenset[int] = frozenset(),
+) -> Rings:
+    """Return all rings of dots that an image may show, before any decision."""
+    found: list[Rings] = []
+    known = np.zeros((0, 3, 3))
+    for search in (whole_discs, voted_discs, small_discs):
+        discs = judged(pyramid, search(pyramid, settings, code, known), known, code)
+        rings = read_discs(pyramid, discs, code, expected)
+        known = np.concatenate([known, rings.frames[rings.of_word >= CERTAIN]])
+        found.append(rings)
+    return Rings.joined(found)
+
+
+def _moved(target: DottedTarget, change: np.ndarray) -> tuple[Any, ...]:
+    """Return the ellipses of a target after a change of its frame, shape (3, 3)."""
+    frames = change @ affine_frames(*np.array(target.dots).T)
+    columns = (*(frames[:, :2, 2] / frames[:, 2:, 2]).T, *ellipse_axes(frames))
+    return tuple(zip(*(of.tolist() for of in columns), strict=True))

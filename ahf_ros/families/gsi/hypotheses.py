@@ -1,0 +1,181 @@
+"""Hypotheses on targets: how probable each is, and which of those that contradict each other.
+
+The probability is a logistic regression, whose weights are in `fitted_weights.json`.
+`benchmarks.confidence` fits them, and shows how far the result can be trusted.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ahf_ros.families.claims import Rivals, owners
+from ahf_ros.families.gsi.evidence import Readings
+from ahf_ros.families.gsi.grouping import Templates
+from ahf_ros.families.gsi.refinement import Placement
+from ahf_ros.prints.gsi import PointFamily
+from ahf_ros.vision.array_record import ArrayRecord
+from ahf_ros.vision.frame import ellipse_axes
+from ahf_ros.vision.homography import reference_frames
+from ahf_ros.vision.logistic import logistic, read_weights
+
+WEIGHTS = Path(__file__).with_name('fitted_weights.json')
+CERTAIN = 0.95  # confidence from which a target is reported
+OBVIOUS = 0.99  # confidence from which a target is not weighed against others in its place
+POSSIBLE = 0.1  # confidence from which a target is reported without its ID, where these are
+SAME = 0.4  # distance of the reference points of the same target in its reach
+
+_UNEVEN = (0.005, 0.05)  # difference of radii that counts as 1, in ln: of any dot, and in px
+_PERSPECTIVE = 0.08  # change of depth from the centre to the edge of a target, that counts as 1
+_MAXIMUM = 6.0  # of both
+
+_PLAUSIBLE = 0.75  # support of a hypothesis that is followed up
+_CLEAR = 0.95  # the same, where only obvious targets are looked for; these have 1
+_MAXIMUM = 250  # hypotheses that are followed up, those with the most support
+_MISFIT = 0.1  # support that a misfit of 1 of the template costs in the order of these
+_EQUAL = 1.0  # distance of the reference points of equal hypotheses, dot radii
+_APART = 0.8  # distance of the reference points of different targets, in their reach
+_CLEARLY = 0.12  # support by which the better one of two groups that lie closer is better
+
+(_OF_TARGET,) = read_weights(WEIGHTS, 'gsi_confidence', 'weights')
+
+
+@dataclass(frozen=True, slots=True)
+class Hypotheses(ArrayRecord):
+    """k groups of dots, and what they were read as.
+
+    Attributes
+    ----------
+    homographies : ndarray of float64, shape (k, 3, 3)
+    covariance : ndarray of float64, shape (k, 2, 2)
+        Of the image of the reference point, px^2.
+    polarity : ndarray of int, shape (k,)
+    scale : ndarray of float64, shape (k,)
+        Radius of the dots in that of the printed design.
+    growth : ndarray of float64, shape (k,)
+        Growth of what is dark in light, px; NaN where it was not measured.
+    words : ndarray of int64, shape (k,)
+        Value of the code.
+    features : ndarray of float64, shape (k, 7)
+        See `confidence_features`.
+    """
+
+    homographies: np.ndarray
+    covariance: np.ndarray
+    polarity: np.ndarray
+    scale: np.ndarray
+    growth: np.ndarray
+    words: np.ndarray
+    features: np.ndarray
+
+    @property
+    def support(self) -> np.ndarray:
+        """Support of the code, as in `Readings`, shape (k,)."""
+        return self.features[:, 0]
+
+    @property
+    def confidence(self) -> np.ndarray:
+        """Probabilities that there is a target with this code, shape (k,)."""
+        return probability(self.features)
+
+
+NO_HYPOTHESES = Hypotheses(
+    homographies=np.zeros((0, 3, 3)),
+    covariance=np.zeros((0, 2, 2)),
+    polarity=np.zeros(0, int),
+    scale=np.zeros(0),
+    growth=np.zeros(0),
+    words=np.zeros(0, int),
+    features=np.zeros((0, len(_OF_TARGET) - 1)),
+)
+
+
+def confidence_features(
+    placement: Placement, readings: Readings, family: PointFamily
+) -> np.ndarray:
+    """Return what tells targets from chance arrangements, and right codes from wrong ones.
+
+    Support, weakest dot and margin of the reading at the places of the placement; the
+    misplacement; the differences of the radii of dots, and the perspective, both up to a bound;
+    and the share of the dots whose edges were found where they should be, shape (k, 7).
+    """
+    radius = float(family.template_radii[family.reference])
+    minor = ellipse_axes(reference_frames(placement.homographies, radius))[1] * placement.scale
+    always, of_pixel = _UNEVEN
+    uneven = placement.unevenness / (always + of_pixel / np.maximum(minor, 0.1))
+    perspective = placement.homographies[:, 2, :2] * family.reach / _PERSPECTIVE
+    return np.stack(
+        [
+            readings.support,
+            readings.weakest,
+            readings.margin,
+            placement.misplacement,
+            np.minimum(uneven, _MAXIMUM),
+            np.minimum(np.hypot(*perspective.T), _MAXIMUM),
+            placement.share,
+        ],
+        axis=1,
+    )
+
+
+def probability(features: np.ndarray) -> np.ndarray:
+    """Return the probabilities that hypotheses are right, shape (k,), by their features."""
+    return logistic(features, _OF_TARGET)
+
+
+def least_support(*, obvious: bool) -> float:
+    """Return the support of groups from which they are followed up."""
+    return _CLEAR if obvious else _PLAUSIBLE
+
+
+def plausible(
+    templates: Templates, readings: Readings, family: PointFamily, *, obvious: bool
+) -> np.ndarray:
+    """Return the indices of the groups that are followed up, of equal ones one.
+
+    Of several groups that lie too close for all to be targets, those that are clearly worse are
+    left out; all but the best one, if only obvious targets are looked for.
+    """
+    rank = readings.support - _MISFIT * templates.misfit
+    order = np.argsort(-rank, kind='stable')
+    order = order[readings.support[order] >= least_support(obvious=obvious)]
+    equal = family.template_radii[family.reference] * _EQUAL
+    units = reference_frames(templates.homographies[order], float(equal))
+    around = reference_frames(templates.homographies[order], family.reach * _APART)
+    words, support, centres = readings.words[order], readings.support[order], units[:, :2, 2]
+    alike, near = _within_each(centres, units), _within_each(centres, around)
+
+    def rivals(index: int) -> np.ndarray:
+        worse = support < support[index] - (0.0 if obvious else _CLEARLY)
+        return alike(index) & (words == words[index]) | near(index) & worse
+
+    return order[owners(len(order), rivals)][:_MAXIMUM]
+
+
+def resolve(hypotheses: Hypotheses, family: PointFamily, minimum: float = CERTAIN) -> np.ndarray:
+    """Return the indices of hypotheses with a minimum of confidence, the best of each place."""
+    confidence = hypotheses.confidence
+    order = np.argsort(-confidence, kind='stable')
+    order = order[confidence[order] >= minimum]
+    units = reference_frames(hypotheses.homographies[order], family.reach * SAME)
+    return order[owners(len(order), _within_each(units[:, :2, 2], units))]
+
+
+def inside(points: np.ndarray, frames: np.ndarray) -> np.ndarray:
+    """Return which points, shape (n, 2), lie in at least one of some circles, by affine frames."""
+    offset = points - frames[:, None, :2, 2]
+    relative = offset @ np.linalg.inv(frames[:, :2, :2]).swapaxes(1, 2)
+    return np.asarray(((relative**2).sum(axis=2) < 1).any(axis=0))
+
+
+def _within_each(points: np.ndarray, frames: np.ndarray) -> Rivals:
+    """Return which points, shape (n, 2), lie in each of some circles, by affine frames."""
+    centres, inverse = frames[:, :2, 2], np.linalg.inv(frames[:, :2, :2]).swapaxes(1, 2)
+
+    def within(index: int) -> np.ndarray:
+        relative = (points - centres[index]) @ inverse[index]
+        return (relative**2).sum(axis=1) < 1
+
+    return within

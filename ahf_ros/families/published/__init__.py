@@ -1,0 +1,1 @@
+"""Detectors as they were published, to compare with."""

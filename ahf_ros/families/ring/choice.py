@@ -1,0 +1,136 @@
+"""The families that an image shows, chosen on its clearest dots.
+
+A glance at a dot bounds the evidence for each print, which is a band and a number of sectors. That
+of the right print is nearly always the highest, so that a few readings tell the families, and
+those that none of the clearest dots shows are not read at all.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ahf_ros.families.ring.decoding import DOUBT
+from ahf_ros.families.ring.families import contested, present_families, words_shown
+from ahf_ros.families.ring.hypotheses import Hypotheses
+from ahf_ros.families.ring.proposals import HOPEFUL, Print, bounds, measure_likely
+from ahf_ros.families.ring.reading import read_bands
+from ahf_ros.families.ring.rivals import has_all
+from ahf_ros.prints.ring import Family
+from ahf_ros.vision.circle_fit import ENOUGH, Fit
+
+_CLEAREST = 32  # dots that tell the family of an image
+_OTHERS = 2048  # clearest ones of the others: texture and letters have thousands
+_CLEAR = 0.5  # bound of the mean evidence of a reading, which spots of light hardly reach
+_DOUBTED = 0.1  # probability that all words are wrong, below which they show a family
+_ROUGH = (0.0,)  # shifts of edges that are tried to find these, px
+_SAMPLE = 8  # of those that seem to have a print, which are read first
+_LIKELIEST = 16  # dots to have a print, of which none shows that it is not there
+_CONCEIVABLE = 0.1  # confidence of a word of many, from which it may be certain as one of few
+_NEARLY = 0.05  # mean evidence of a reading, by which a print is as good as the best one
+_PRINTS = 4  # the most likely ones, which are tried on the same dots
+
+
+def choose_families(gray: np.ndarray, dots: Fit, families: Sequence[Family]) -> list[Family]:
+    """Return as few of some families as have all words of the print that the clearest dots show.
+
+    Only their likeliest print is tried, on the likeliest of them.
+    """
+    clearest = dots.select(dots.clearest(_CLEAREST))
+    return present_families(_words_shown(gray, clearest, families, tried=1, most=_SAMPLE))[0]
+
+
+def further_families(gray: np.ndarray, dots: Fit, families: Sequence[Family]) -> list[Family]:
+    """Return the same for dots that no family explains, most of which are none of targets."""
+    dots = dots.select(dots.share >= ENOUGH)
+    dots = dots.select(dots.clearest(_OTHERS))
+    if not families or not len(dots.frames):
+        return []
+    finest = {code.band: code.bits for code in sorted(families, key=lambda code: code.bits)}
+    mean = bounds(gray, dots, list(finest.items()), _ROUGH).max(axis=0)
+    order = np.argsort(-mean, kind='stable')[: np.count_nonzero(mean > _CLEAR)][:_CLEAREST]
+    return present_families(_words_shown(gray, dots.select(order), families))[0]
+
+
+def _words_shown(
+    gray: np.ndarray,
+    dots: Fit,
+    families: Sequence[Family],
+    tried: int = _PRINTS,
+    most: int = _LIKELIEST,
+) -> list[dict[Family, int]]:
+    """Return words of the likeliest print of some dots that has any, by family.
+
+    So many prints are tried at the most, on so many of the likeliest dots, of the likeliest print
+    on a sample first, as it is nearly always the right one.
+    """
+    prints = list(dict.fromkeys((code.band, code.bits) for code in families))
+    mean = bounds(gray, dots, prints)
+    hopeful = (mean.max(axis=0) > HOPEFUL) & (dots.share >= ENOUGH)
+    if not hopeful.any():
+        return []
+    dots, mean = dots.select(hopeful), mean[:, hopeful]
+    likely = mean > mean.max(axis=0) - _NEARLY
+    for rank, best in enumerate(_likeliest(prints, np.maximum(mean, 0))[:tried]):
+        band, bits = prints[best]
+        same = [code for code in families if code.band == band and bits % code.bits == 0]
+        read: list[Hypotheses] = []
+        order = np.argsort(-mean[best], kind='stable')
+        likeliest = order[likely[best, order]][:most]
+        ends = [0, _SAMPLE, most] if rank == 0 else [0, most]
+        for some in filter(len, (likeliest[part] for part in map(slice, ends, ends[1:]))):
+            read.append(_read(gray, dots.select(some), same))
+            every = Hypotheses.joined(read)
+            if np.prod(1 - every.confidence) < _DOUBTED:
+                return words_shown(every, families)
+    return []
+
+
+def _likeliest(prints: Sequence[Print], mean: np.ndarray) -> list[int]:
+    """Return the indices of prints, the likeliest first, from the bounds of k dots, (prints, k).
+
+    That which all dots may have comes before those that the best two have: where light makes most
+    of the dots, few are of targets, but none has a higher bound.
+    """
+    orders = []
+    for of_prints in (mean.mean(axis=1), np.sort(mean, axis=1)[:, -2:].mean(axis=1)):
+        # Whatever has a number of sectors has its multiples as well.
+        for index, (band, bits) in enumerate(prints):
+            if any(
+                of_prints[other] > of_prints[index] - _NEARLY
+                for other, (of_band, fewer) in enumerate(prints)
+                if of_band == band and fewer < bits and bits % fewer == 0
+            ):
+                of_prints[index] -= _NEARLY
+        orders.append(np.argsort(-of_prints, kind='stable').tolist())
+    of_all, of_best = orders
+    return list(dict.fromkeys([of_all[0], *of_best]))
+
+
+def _read(gray: np.ndarray, dots: Fit, families: Sequence[Family]) -> Hypotheses:
+    """Return the words of dots, by those of some families that explain their bands best.
+
+    Families that have all words of others are read first. Where they find nothing conceivable,
+    the others find nothing, as they have no other words.
+    """
+    dots, _ = measure_likely(gray, dots, None)
+    narrow = [
+        code
+        for code in families
+        if any(has_all(of, code) and len(code.words) < len(of.words) for of in families)
+    ]
+    found = [read_bands(gray, dots, code) for code in families if code not in narrow]
+    read = _shown(found)
+    if np.prod(1 - read.confidence) < _DOUBTED:
+        return read  # whose prints the others may have, too
+    conceivable = np.any([of.confidence >= _CONCEIVABLE for of in found], axis=0)
+    if conceivable.any():
+        found += [read_bands(gray, dots.select(conceivable), code) for code in narrow]
+    return _shown(found)
+
+
+def _shown(found: Sequence[Hypotheses]) -> Hypotheses:
+    """Return the certain ones of what families read, of each dot the best."""
+    read = contested(Hypotheses.joined(found))
+    return read.select(read.certain & (read.coded > -DOUBT))

@@ -1,0 +1,124 @@
+"""How hypotheses that contradict each other are settled, and what others say of each."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ahf_ros.families.claims import Rivals, leading, owners, sole_owners, surer
+from ahf_ros.families.ring.confidence import COVERED
+from ahf_ros.families.ring.decoding import CLEAR
+from ahf_ros.families.ring.hypotheses import Hypotheses
+from ahf_ros.vision import frame
+from ahf_ros.vision.shape_votes import NEIGHBOURS
+
+_CLEARLY = 2.0  # times the evidence of another claim to the same dot
+_FOREIGN = 10.0  # log odds of arcs of any length against a word, which is none then
+_OTHER_COLOUR = 0.2  # of a foreign band, that a target of the other colour counts for
+_ROUND = 0.6  # share of the edges of a word that are in their place, where there is a band
+_CODED = 5.0  # odds of words against arcs of any length, before any is read
+_OVERLAP = 0.92  # of the radii of two targets, at which the paper of one hides marks of the other
+_SHEAR = 0.5  # ln of axes, by which a shape differs from those of all targets beside it
+_ODD = 10.0  # odds against a target in another shape than those beside it
+
+
+def among_others(hypotheses: Hypotheses) -> Hypotheses:
+    """Return hypotheses of an image, less certain where it shows bands of no family that is read.
+
+    Targets of one image share a family. Whole bands that arcs of any length explain better than
+    words, and targets that do not look like their print are foreign. Among these a word is one by
+    chance, unless more targets share its family and its colour, which most targets of an image do;
+    and it is arcs of any length, unless it explains its band better. What is not certain among
+    these speaks for no other word of its family. Targets that are close to each other have much
+    the same shape, which a word that is one by chance has not.
+    """
+    arcs = (hypotheses.coded < -_FOREIGN) & (hypotheses.share > _ROUND)
+    arcs |= hypotheses.unlike > COVERED
+    odd = np.where(_odd(hypotheses), _ODD, 1.0)
+    left = hypotheses
+    while True:
+        confidence = _among(hypotheses, left, arcs & ~left.certain, odd)
+        among = replace(hypotheses, confidence=confidence)
+        if np.array_equal(among.certain, left.certain):
+            return among
+        left = among
+
+
+def _among(
+    hypotheses: Hypotheses, likely: Hypotheses, foreign: np.ndarray, odd: np.ndarray
+) -> np.ndarray:
+    """Return the confidence of hypotheses, by how likely each is and by foreign bands, (k,).
+
+    `odd`, shape (k,), are the odds against their shapes.
+    """
+    left = hypotheses.confidence.copy()
+    evidence = likely.certain * likely.confidence
+    kinds = [(code, sign) for code in dict.fromkeys(hypotheses.families) for sign in (1, -1)]
+    for code, sign in kinds:
+        of_family = hypotheses.families == code
+        own = of_family & (hypotheses.polarity == sign)
+        sure, others = hypotheses.confidence[own], foreign[own].sum()
+        unlike = _OTHER_COLOUR * evidence[of_family & ~own].sum()
+        alike = evidence[own].sum() - evidence[own] + 0.5
+        by_chance = np.maximum((others + unlike + 0.5) / alike, 1) * odd[own]
+        as_arcs = others / alike * np.exp(-np.maximum(hypotheses.coded[own], 0)) / _CODED
+        left[own] = sure / (1 + (1 - sure) * (by_chance - 1) + sure * as_arcs)
+    return left
+
+
+def _odd(hypotheses: Hypotheses) -> np.ndarray:
+    """Return whether certain hypotheses have another shape than all those beside, bool, (k,)."""
+    odd, certain = np.zeros(len(hypotheses.frames), bool), np.flatnonzero(hypotheses.certain)
+    if len(certain) <= NEIGHBOURS:
+        return odd
+    frames = hypotheses.frames[certain]
+    beside = frame.nearest(frames, frames, NEIGHBOURS + 1)[:, 1:]  # the first one is itself
+    odd[certain] = frame.shears(frames, frames[beside]).min(axis=1) > _SHEAR
+    return odd
+
+
+def resolve(hypotheses: Hypotheses, ids: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return which hypotheses to keep, and which of these stay certain, bool, shape (k,) each.
+
+    They come in the order of their confidence; `ids` are equal where words are the same. The best
+    one of a dot is kept. Dots on the band of a certain target are its sectors and are dropped.
+    Certain stays what neither another reading of its dot, nor a target whose band overlaps, nor
+    another claim to its ID comes near to.
+    """
+    marked, order = hypotheses.marked, np.arange(len(ids))
+    on_it = on_targets(hypotheses, hypotheses.certain)
+
+    def against(index: int) -> np.ndarray:
+        return on_it(index) & (ids != ids[index]) & (order > index)
+
+    kept = owners(len(ids), on_it)
+    certain = kept & leading(marked, hypotheses.certain, against, _CLEARLY, CLEAR)
+    sure = 1 / (1 - hypotheses.confidence + np.finfo(float).eps)
+    certain = surer(sure, certain, overlapping(hypotheses))
+    return kept, sole_owners(hypotheses.confidence, certain, lambda index: ids == ids[index])
+
+
+def on_targets(hypotheses: Hypotheses, certain: np.ndarray) -> Rivals:
+    """Return what lies on the dot of a hypothesis, or on the band of a certain one."""
+    reach = np.where(certain, hypotheses.reach, frame.ellipse_axes(hypotheses.frames)[0])
+    centres = hypotheses.frames[:, :2, 2]
+    return lambda index: np.hypot(*(centres - centres[index]).T) < reach[index]
+
+
+def overlapping(hypotheses: Hypotheses) -> Rivals:
+    """Return of which hypotheses the bands overlap that of one.
+
+    There the paper of one target lies on that of the other. White paper on white paper may hide
+    marks without a trace, so that only the one on top is certain, which is the surer one.
+    """
+    major, _, _ = frame.ellipse_axes(hypotheses.frames)
+    outer = major * np.array([code.band_outer for code in hypotheses.families])
+    centres = np.column_stack([hypotheses.frames[:, :2, 2], np.ones(len(major))])
+
+    def overlapping(index: int) -> np.ndarray:
+        x, y, scale = np.linalg.solve(hypotheses.frames[index], centres.T)
+        distance = np.hypot(x, y) / np.abs(scale) * major[index]
+        return np.asarray(distance < _OVERLAP * (outer + outer[index]))
+
+    return overlapping

@@ -1,0 +1,174 @@
+"""The competition of families for the bands about dots.
+
+Every family reads a band by the same likelihood, so that their words compare by their evidence. To
+save time, the family that most of the clearest dots have reads all dots, and the others those that
+are not clear yet.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import chain
+
+import numpy as np
+
+from ahf_ros.families.claims import leading
+from ahf_ros.families.ring.hypotheses import Hypotheses
+from ahf_ros.families.ring.known import NOTHING_KNOWN, Prior
+from ahf_ros.families.ring.reading import read_bands
+from ahf_ros.families.ring.rivals import against_rivals, has_all, odds
+from ahf_ros.prints.ring import Family, canonical, words_of_prints
+from ahf_ros.vision import frame
+from ahf_ros.vision.circle_fit import Fit
+
+_DOUBT = 0.05  # odds of another family that has all prints, up to which one is sure
+_ALL_WORDS = 0.5  # odds of a family of all words against one of a rule, before any print is seen
+
+
+def read_families(
+    gray: np.ndarray,
+    dots: Fit,
+    families: Sequence[Family],
+    prior: Prior = NOTHING_KNOWN,
+) -> Hypotheses:
+    """Return what the bands about dots are read as, at least one hypothesis of each dot.
+
+    The first family reads all dots, the others those that are not clear yet.
+    """
+    first, *others = families
+    found = read_bands(gray, dots, first, prior)
+    found = against_rivals(gray, dots, found, families, prior)
+    if not others:
+        return found
+    rest = dots.select(~found.clear)
+    parts = [found]
+    for code in others:
+        read = read_bands(gray, rest, code, prior)
+        parts.append(read.select(read.words > 0))
+    return contested(Hypotheses.joined(parts))
+
+
+def _narrowest(words: dict[Family, int]) -> dict[Family, int]:
+    """Return words of a print without those of families that have all words of another one."""
+    return {
+        code: word
+        for code, word in words.items()
+        if not any(has_all(code, of) and len(of.words) < len(code.words) for of in words)
+    }
+
+
+def contested(read: Hypotheses) -> Hypotheses:
+    """Return hypotheses of which none is certain where another family has more evidence."""
+    _, minor, _ = frame.ellipse_axes(read.frames)
+    centres, names = read.frames[:, :2, 2], np.array([code.name for code in read.families], str)
+
+    def rivals(index: int) -> np.ndarray:
+        near = np.hypot(*(centres - centres[index]).T) < minor[index]
+        return near & (names != names[index])
+
+    beaten = read.certain & ~leading(odds(read), read.certain, rivals, 1.0)
+    return replace(read, confidence=np.where(beaten, 0.0, read.confidence))
+
+
+def decoded(hypotheses: Hypotheses) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the names of families, the canonical code words and the IDs of k hypotheses."""
+    names = np.array([code.name for code in hypotheses.families], str)
+    codes, ids = np.zeros((2, len(names)), np.int64)
+    for code in dict.fromkeys(hypotheses.families):
+        which = hypotheses.families == code
+        codes[which], ids[which] = canonical(hypotheses.words[which], code)
+    return names, codes, ids
+
+
+def words_shown(hypotheses: Hypotheses, families: Sequence[Family]) -> list[dict[Family, int]]:
+    """Return the words that the prints of k readings are, by those of some families."""
+    codes = decoded(hypotheses)[1]
+    prints: dict[int, dict[Family, int]] = {}
+    for code in dict.fromkeys(hypotheses.families):
+        own = np.flatnonzero(hypotheses.families == code)
+        prints |= zip(own.tolist(), words_of_prints(code, codes[own], families), strict=True)
+    return [prints[index] for index in sorted(prints)]
+
+
+def settle_same_prints(hypotheses: Hypotheses, families: Sequence[Family]) -> Hypotheses:
+    """Assign prints shared by several families to one of them, or mark them uncertain.
+
+    Where two families of an image have a print, it is of the one whose words the other has all, or
+    the nearest target that only one of them has tells which it is.
+    """
+    if len(families) == 1:
+        return hypotheses
+    certain = np.flatnonzero(hypotheses.certain).tolist()
+    shown = words_shown(hypotheses.select(certain), families)
+    prints = dict(zip(certain, shown, strict=True))
+    present, sure = present_families(list(prints.values()))
+    options = {
+        index: _narrowest({code: word for code, word in words.items() if code in present})
+        for index, words in prints.items()
+    }
+    clear = np.array([index for index, words in options.items() if len(words) == 1], int)
+    own = [next(iter(options[index])) for index in clear.tolist()]
+    words, confidence = hypotheses.words.copy(), hypotheses.confidence.copy()
+    of_families = hypotheses.families.copy()
+    centres = hypotheses.frames[:, :2, 2]
+    for index, of_print in options.items():
+        near = np.flatnonzero([code in of_print for code in own])
+        if not near.size:
+            confidence[index] = 0.0
+            continue
+        away = np.hypot(*(centres[clear[near]] - centres[index]).T)
+        code = own[near[away.argmin()]]
+        if code not in sure:
+            confidence[index] = 0.0
+        if code is not of_families[index]:
+            words[index] = of_print[code]
+            of_families[index] = code
+    return replace(hypotheses, words=words, confidence=confidence, families=of_families)
+
+
+def present_families(prints: Sequence[dict[Family, int]]) -> tuple[list[Family], set[Family]]:
+    """Return the families that say all prints in the fewest nats, and those that are sure.
+
+    No other may stand for these. A print costs the logarithm of the number of words of its family,
+    and what it takes to say which of the families of the image it is of. One family is likelier,
+    and one whose words follow a rule. A family of more words would hardly show only these.
+    """
+    left, present, sure = list(prints), [], set()
+    while left:
+        count = Counter(chain.from_iterable(left))
+        most = max(len(code.words) for code in count)
+        best = min(
+            count,
+            key=lambda code: (
+                _nats(count[code], len(code.words), len(left) - count[code], most)
+                - np.log(_before(code)),
+                len(code.words),
+            ),
+        )
+        covered = [of for of in left if best in of]
+        different = len({of[best] for of in covered})
+        rivals = set.intersection(*(set(of) for of in covered)) - {best}
+        odds = (
+            (len(best.words) / len(code.words)) ** different * _before(code) / _before(best)
+            for code in rivals
+        )
+        present.append(best)
+        if sum(odds) < _DOUBT:
+            sure.add(best)
+        left = [of for of in left if best not in of]
+    return present, sure
+
+
+def _before(code: Family) -> float:
+    """Return the odds of a family before any print is seen."""
+    return _ALL_WORDS if code.has_all_words else 1.0
+
+
+def _nats(own: int, words: int, others: int, most: int) -> float:
+    """Return what prints cost: `own` in a family of some words, others in further ones of most."""
+    every = own + others
+    mixed = -own * np.log(own / every) - others * np.log(max(others, 1) / every)
+    further = -np.log(_DOUBT) if others else 0.0
+    return float(own * np.log(words) + others * np.log(most) + mixed + further)

@@ -1,0 +1,497 @@
+"""The likelihood of what is seen about a dot: paper, ink, or anything.
+
+Ink multiplies light, so that in ln I the edge of a mark is a step of known height wherever the
+light falls. At every angle two kinds of readings are compared with what paper and ink would give:
+
+- steps across the inner and the outer edge of the band, with the light on the ground beside them;
+- levels in gap, band and margin, with the light that the rest of the target's ground shows, where
+  light repeats itself or is even (`light.predicted_light`).
+
+All are logarithms of ratios to the density of what lies about any dot: flat ground mostly, else
+edges of any height. Their sum over a target is the log odds of a word against no target at all.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ahf_ros.families.ring.polar import CORRELATION, LIGHT_EDGE, PolarImages
+from ahf_ros.vision.array_record import ArrayRecord
+from ahf_ros.vision.circle_fit import SOFT
+from ahf_ros.vision.image import SATURATED
+from ahf_ros.vision.logarithm import LOG_OFFSET
+from ahf_ros.vision.normal import normal_integral
+from ahf_ros.vision.robust import medians
+
+_BESIDE = 2.6  # distance of a reading from an edge that is sharp, px
+_MINIMUM_BESIDE, _MAXIMUM_BESIDE = 0.13, 0.36  # bounds of that distance, dot radii
+_FLAT = 0.12  # deviation of steps of ln where there is no edge, but for noise
+_WHITE = 0.03  # the same of paper between ground that glare makes white
+_MARK, _MARK_TAIL = 0.18, 0.3  # of the step of a mark: towards less, where blur fills it, and more
+_PAPER_LEVEL, _INK_LEVEL = 0.05, 0.12  # of levels of paper and ink under predicted light
+_ANY = 0.22  # density of steps and levels of ln where anything lies
+_PLAIN = 0.35  # share of what lies about any dot that is as flat as ground
+_MARKED = 0.2  # share of what is dark that has marks, from which it is in shadow
+_AT_ENDS = 0.25  # probability that an end of an arc does not look as blur alone makes it
+_FURTHER = 0.1  # price of each further reading in light that nothing predicts
+_UNLIKELY = 2.5  # standard deviations, from which a level was not predicted
+_ACROSS = (0.3, 0.75)  # shares of the gap, between which edges of light show
+_ANGLES = 120  # at which large targets have all the evidence that readings can give
+_MAXIMUM_GROWTH = 0.3  # dot radii
+_RADIUS, _DEPTH = 2.25, 0.2  # of readings, and distance of their depths, dot radii
+_SHARE = 0.12  # error of shares of ink between paper and ink, as far apart as these are
+
+SHARES = (0.25, 0.5, 0.75)
+"""Of ink between paper and ink, where blur mixes both at ends of arcs."""
+
+SURPRISES = (0.05, 0.5)
+"""Least and largest probability of light that nothing predicts."""
+
+HOPEFUL = 0.2
+"""Mean log odds of a reading, from which a band is read on."""
+
+FEW_MARKS = 1 / 16
+"""Marked share of a band, below which words against paper have less evidence than that."""
+
+
+@dataclass(frozen=True, slots=True)
+class Evidence(ArrayRecord):
+    """Log likelihoods of k targets at m angles, over those of anything.
+
+    The inner and the outer half of the band, with the ground beside each, are seen apart, because
+    what lies on one may leave the other.
+
+    Attributes
+    ----------
+    paper, ink : ndarray of float32, shape (k, 2, m)
+        Where the band is unmarked, and where it is marked.
+    between : ndarray of float32, shape (k, 2, s, m)
+        Where blur mixes both, for shares of ink in equal steps from paper to ink; s may be 0.
+    typical : ndarray of float32, shape (k, 2, 2, m)
+        What edges of paper and of ink give on average where these look as they should, as far as
+        edges of light let them; only where shares of ink are asked for.
+    weight : ndarray of float32, shape (k,)
+        Of a reading, which is part of all; less than 1 where neighbours tell the same.
+    dot : ndarray of float32, shape (k,)
+        Of the dot as ink, over the dot as light on paper.
+    lit : ndarray of float32, shape (k,)
+        Probability that an edge of light lies between two neighbouring readings.
+    covered : ndarray of bool, shape (k, 2, m)
+        Where something covers the ground beside the band; only where shares of ink are asked for.
+    blur : ndarray of float64, shape (k,)
+        Of ends of arcs, standard deviation in angles.
+    """
+
+    paper: np.ndarray
+    ink: np.ndarray
+    between: np.ndarray
+    typical: np.ndarray
+    weight: np.ndarray
+    dot: np.ndarray
+    lit: np.ndarray
+    covered: np.ndarray
+    blur: np.ndarray
+
+    def plus(self, levels: Evidence) -> Evidence:
+        """Return the sum of the evidence of edges and of levels, where nothing covers the ground.
+
+        What covers the ground beside an edge covers the edge, and may reach under the levels of
+        both halves.
+        """
+        beside = np.logical_or.reduce(self.covered, axis=1, keepdims=True)
+        anywhere = np.logical_or.reduce(beside, axis=2, keepdims=True)
+        across = beside | (levels.covered & anywhere)
+        return Evidence(
+            paper=np.where(self.covered, 0, self.paper) + np.where(across, 0, levels.paper),
+            ink=np.where(self.covered, 0, self.ink) + np.where(across, 0, levels.ink),
+            between=np.where(self.covered[:, :, None], 0, self.between)
+            + np.where(across[:, :, None], 0, levels.between),
+            typical=self.typical,
+            weight=self.weight,
+            dot=self.dot + levels.dot,
+            lit=np.maximum(self.lit, levels.lit),
+            covered=self.covered,
+            blur=self.blur,
+        )
+
+
+def growth_by(shift: float | np.ndarray, size: np.ndarray) -> np.ndarray:
+    """Return the growth of dots of radii (k,) by shifts of edges, both px, in dot radii, (k,)."""
+    return np.clip(shift / size, -_MAXIMUM_GROWTH, _MAXIMUM_GROWTH)
+
+
+def band_edges(
+    radius: np.ndarray, growth: np.ndarray, band: tuple[float, float]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the radii of the edges of a band whose ink has grown on all sides, (k,) each.
+
+    The radii of dots as printed and the growth of their colour, (k,), have the unit of the frame.
+    """
+    inner, outer = band
+    return inner * radius - growth, outer * radius + growth
+
+
+def weights(polar: PolarImages) -> np.ndarray:
+    """Return the weights of readings at neighbouring angles, ndarray of float32, shape (k,).
+
+    They add up to the same for bands of all families, so that their evidence can be compared.
+    """
+    angles = polar.gray.shape[1]
+    along = 2 * np.pi * _RADIUS * polar.size / angles / CORRELATION
+    return np.minimum(along, min(1.0, _ANGLES / angles)).astype(np.float32)
+
+
+def edge_evidence(
+    polar: PolarImages,
+    radius: np.ndarray,
+    growth: np.ndarray,
+    band: tuple[float, float],
+    shares: Sequence[float] = (),
+) -> Evidence:
+    """Return the evidence of steps across the edges of bands, and of those of shares of ink.
+
+    From the radii of the dots as printed and the growth of their colour, (k,), units of the frame.
+    """
+    inner, outer = band_edges(radius, growth, band)
+    edges = light_edges(polar, radius, growth, inner)
+    ground_at, band_at = _beside_edges(polar, radius + growth, inner, outer)
+    ground, inside = polar.at(ground_at), polar.at(band_at)
+    # Shares of ink on ground and band, without marks and with them.
+    bare = [_rest(polar, at, radius + growth) for at in (ground_at, band_at)]
+    marked = [
+        of_rest + _blurred(polar, at, inner[:, None], outer[:, None])
+        for of_rest, at in zip(bare, (ground_at, band_at), strict=True)
+    ]
+    paper, ink, *between = _step_evidence(polar, inside, ground, edges, bare, marked, shares)
+    between, typical = between[: len(shares)], between[len(shares) :]
+    weight = weights(polar)
+    visible = polar.reach[:, None] >= np.maximum(ground_at, band_at)
+    visible[:, 1] &= polar.plate > outer[:, None]
+    share = weight[:, None, None] * visible
+    covered = np.zeros(visible.shape, bool)
+    if shares:
+        lit_ground = np.maximum(ground, polar.paper(ground, marked[0]))
+        covered = _covered(polar, inside, lit_ground, ink > paper, visible)
+    return Evidence(
+        paper=paper * share,
+        ink=ink * share,
+        between=_stacked(between, ink) * share[:, :, None],
+        typical=_stacked(typical, ink) * share[:, :, None],
+        weight=weight,
+        dot=np.zeros_like(weight),
+        lit=edges.astype(np.float32),
+        covered=covered,
+        blur=_blur_along(polar, band),
+    )
+
+
+def _beside_edges(
+    polar: PolarImages, dot: np.ndarray, inner: np.ndarray, outer: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return radii beside the edges of bands, on ground and in the band, (k, 2, 1) or (k, 2, m).
+
+    The edges of dots and bands are at radii (k,). Where a plate ends, ground is read in the middle
+    of its rim.
+    """
+    beside = _BESIDE + np.maximum(polar.blur - SOFT, 0)
+    beside = np.clip(beside / polar.size, _MINIMUM_BESIDE, _MAXIMUM_BESIDE)
+    before = np.minimum(beside, 0.5 * (inner - dot))
+    within = np.minimum(beside, 0.45 * (outer - inner))
+    ground, band = (
+        np.stack(of, axis=1)[..., None]
+        for of in ((inner - before, outer + beside), (inner + within, outer - within))
+    )
+    if np.isfinite(polar.plate).any():
+        ground = np.repeat(ground, polar.plate.shape[1], axis=2)
+        ground[:, 1] = np.minimum(ground[:, 1], (polar.plate + outer[:, None]) / 2)
+    return ground, band
+
+
+def _rest(polar: PolarImages, at: np.ndarray, dot: np.ndarray) -> np.ndarray:
+    """Return the shares of ink at radii (k, r, m) that is not of the band, (k, r, m).
+
+    It is ink of dots with edges at radii (k,); white paper beyond plates is as white ink.
+    """
+    of_dot = _blurred(polar, at, -np.inf, dot[:, None])
+    if np.isinf(polar.plate).all():
+        return of_dot
+    return np.asarray(of_dot + _blurred(polar, at, polar.plate, np.inf))
+
+
+def _blurred(
+    polar: PolarImages,
+    at: np.ndarray,
+    inner: np.ndarray | float,
+    outer: np.ndarray | float,
+) -> np.ndarray:
+    """Return the shares of ink that blur leaves or brings at radii (k, r, m) of a ring.
+
+    The radii of the ring are (k, m), too, or (k, 1).
+    """
+    deviation = (polar.blur / polar.size)[:, None, None]
+    below, above = (
+        normal_integral((np.atleast_2d(of)[:, None] - at) / deviation) for of in (inner, outer)
+    )
+    return np.asarray(above - below).astype(np.float32)
+
+
+def _blur_along(polar: PolarImages, band: tuple[float, float]) -> np.ndarray:
+    """Return the blur of ends of arcs, standard deviations in angles, shape (k,)."""
+    return np.asarray(polar.blur / (np.pi * sum(band) * polar.size / polar.gray.shape[1]))
+
+
+def _stacked(between: Sequence[np.ndarray], like: np.ndarray) -> np.ndarray:
+    """Return arrays (k, 2, m) as one, (k, 2, n, m), of which there may be none."""
+    none = np.zeros((*like.shape[:2], 0, like.shape[2]), np.float32)
+    return np.stack(between, axis=2) if between else none
+
+
+def _covered(
+    polar: PolarImages,
+    band: np.ndarray,
+    ground: np.ndarray,
+    marked: np.ndarray,
+    visible: np.ndarray,
+) -> np.ndarray:
+    """Return where something covers the ground, which is no shadow, all of shape (k, 2, m).
+
+    Marks in shadow are darker than those in the light, and nothing that covers a target is.
+    """
+    shade = polar.shade[:, None, None]
+    covered = (ground <= shade) & visible
+    if not covered.any():
+        return covered
+    in_shadow = covered & marked & (band < polar.inked(shade, band))
+    shadow = in_shadow.sum(axis=(1, 2)) > _MARKED * covered.sum(axis=(1, 2))
+    covered &= ~shadow[:, None, None]
+    # The border of what is as dark as ink looks like the edge of a mark.
+    as_ink = polar.levels(polar.inked(shade, ground))
+    like_ink = [np.abs(polar.levels(of) - as_ink) < LIGHT_EDGE for of in (ground, band)]
+    across = np.logical_and.reduce(like_ink[1], axis=1, keepdims=True)
+    hidden = np.asarray(covered & like_ink[0])[:, ::-1] & across
+    return np.asarray(covered | hidden)
+
+
+def light_edges(
+    polar: PolarImages, radius: np.ndarray, growth: np.ndarray, inner: np.ndarray
+) -> np.ndarray:
+    """Return the probabilities of an edge of light between neighbours, as gaps show it, (k,)."""
+    start, width = radius + growth, inner - radius - growth
+    across = polar.at((start[:, None] + np.multiply.outer(width, _ACROSS))[..., None])
+    level, noise = polar.logs(across)
+    step = np.abs(level[:, 0] - level[:, 1])
+    many = (step**2 > LIGHT_EDGE**2 + 4 * (noise**2).sum(axis=1)).mean(axis=1)
+    return np.clip(many, *SURPRISES)
+
+
+def _step_evidence(
+    polar: PolarImages,
+    band: np.ndarray,
+    ground: np.ndarray,
+    edges: np.ndarray,
+    bare: Sequence[np.ndarray],
+    marked: Sequence[np.ndarray],
+    shares: Sequence[float],
+) -> list[np.ndarray]:
+    """Return the evidence of steps from ground into bands, (k, 2, m), for paper and for ink.
+
+    The shares of ink that blur leaves on ground and band, shape (k, 2, 1) each, are those of bare
+    bands and of marked ones. Glare makes the step of a mark smaller. Where it makes ground white,
+    paper between is white. Then comes that for shares of marks, and what paper and ink give on
+    average: where they look as they should, and where an edge of light lies between.
+    """
+    (level, noise), (beside, of_ground) = polar.logs(band), polar.logs(ground)
+    blank, ink = (
+        polar.printed(polar.paper(ground, on_ground), on_band, band)
+        for on_ground, on_band in (bare, marked)
+    )
+    mark = polar.levels(ink) - beside
+    step = level - beside
+    limit = polar.glare[:, None, None]
+    glare, white = ground >= limit, np.minimum(*ground.swapaxes(0, 1))[:, None] >= SATURATED
+    flat = np.where(white & (limit <= SATURATED), np.float32(_WHITE), np.float32(_FLAT))
+    spread = np.sqrt(flat**2 + noise**2 + of_ground**2)
+    flat = normal(level - polar.levels(blank), spread)
+    more = (step - mark) * np.sign(mark)
+    expected = of_ground * _gain(ground, ink)
+    of_noise, of_ink = noise**2, expected**2
+    low, high = (np.sqrt(of**2 + of_noise + of_ink) for of in (_MARK, _MARK_TAIL))
+    width = np.where(more > 0, high, low)
+    inked = normal(more, width) * (2 * width / (low + high))
+    if glare.any():
+        less = glare & (more < 0) & (more > -np.abs(mark))
+        inked = np.where(less, np.maximum(inked, 1 / np.maximum(np.abs(mark), _FLAT)), inked)
+    lit = edges.astype(np.float32)[:, None, None]
+    densities = [flat, inked]
+    width = np.sqrt(_MARK**2 + (_SHARE * mark) ** 2 + of_noise + of_ink) if shares else low
+    for share in shares:
+        on_ground, on_band = (
+            of_bare + np.float32(share) * (of_mark - of_bare)
+            for of_bare, of_mark in zip(bare, marked, strict=True)
+        )
+        mixed = polar.printed(polar.paper(ground, on_ground), on_band, band)
+        densities.append(normal(level - polar.levels(mixed), width))
+    anything = [_PLAIN * flat + (1 - _PLAIN) * _ANY] * len(densities)
+    if shares:
+        zero = np.zeros_like(spread)
+        densities += [normal(zero, spread), normal(zero, (low + high) / 2)]
+        plain = normal(zero, spread), normal(mark, spread)
+        anything += [_PLAIN * of + (1 - _PLAIN) * _ANY for of in plain]
+    doubts = [lit] * len(densities)
+    doubts[2 : 2 + len(shares)] = [np.maximum(lit, np.float32(_AT_ENDS))] * len(shares)
+    odds = [
+        np.log(((1 - doubt) * density + doubt * _ANY) / of)
+        for doubt, density, of in zip(doubts, densities, anything, strict=True)
+    ]
+    if shares:
+        at_edge = lit * np.log(lit / (1 - _PLAIN))
+        odds[-2:] = [(1 - lit) * of + at_edge for of in odds[-2:]]
+    clear = polar.tells(band)
+    return [np.where(clear, of, 0) for of in odds]
+
+
+def _gain(paper: np.ndarray, ink: np.ndarray) -> np.ndarray:
+    """Return how much larger an error of paper is in the ink that is expected of it, of ln."""
+    return (ink / np.maximum(paper, 1)) * (paper + LOG_OFFSET) / (ink + LOG_OFFSET)
+
+
+def level_evidence(
+    polar: PolarImages,
+    levels: np.ndarray,
+    light: np.ndarray,
+    spread: np.ndarray,
+    radii: np.ndarray,
+    growth: np.ndarray,
+    band: tuple[float, float],
+    shares: Sequence[float] = (),
+) -> Evidence:
+    """Return the evidence of levels in dots and bands, and beside these, under predicted light.
+
+    Gray values `levels`, shape (k, m, d), were read at radii (d,): in the dot, in the gap, in the
+    band or beyond it. `light` and `spread`, as `predicted_light` gives them, are what paper has
+    there and the deviation of its logarithm. Of `polar` only the looks of ink and of edges are
+    used. The growth of the dots' colour, (k,), is in units of the radii.
+    """
+    level, noise = polar.logs(levels)
+    known = np.isfinite(spread)
+    inner, outer = band
+    in_dot, in_band = radii < 1, (radii > inner) & (radii < outer)
+    edges = (of[:, None] for of in band_edges(np.ones(len(growth)), growth, band))
+    share = np.where(in_dot, 1, _blurred(polar, radii[None, :, None], *edges)[..., 0])[:, None]
+    spread, inked = np.where(known, spread, 1), polar.printed(light, share, levels)
+    of_paper = np.sqrt(_PAPER_LEVEL**2 + noise**2 + spread**2)
+    of_ink = np.sqrt(_INK_LEVEL**2 + noise**2 + (spread * _gain(light, inked)) ** 2)
+    of_light, of_inked = polar.levels(light), polar.levels(inked)
+    errors = level - of_light
+    densities = [normal(errors, of_paper), normal(level - of_inked, of_ink)]
+    of_share = np.sqrt(of_ink**2 + (_SHARE * (of_inked - of_light)) ** 2)
+    for of_mark in shares:
+        mixed = polar.levels(polar.printed(light, share * np.float32(of_mark), levels))
+        densities.append(normal(level - mixed, of_share))
+    anything = _PLAIN * densities[0] + (1 - _PLAIN) * _ANY
+    depth = np.minimum(_DEPTH * polar.size / CORRELATION, 1)
+    weight = (weights(polar) * depth).astype(np.float32)
+    limit = polar.glare[:, None, None]
+    reach = np.minimum(polar.reach, polar.rim(outer)[:, 0])
+    seen = known & polar.tells(levels) & (radii <= reach[..., None])
+    on_ground = ~in_dot & ~in_band
+    middle = (inner + outer) / 2
+    halves = (radii > 1) & (radii < middle), radii > middle
+    for half in halves:
+        seen[..., half] &= ~(levels[..., half & on_ground] >= limit).any(axis=2, keepdims=True)
+    dark = levels <= polar.shade[:, None, None]
+    surprise = _surprise(errors, of_paper, seen & on_ground)
+    as_ink = _as_ink(polar, level, noise, of_light, [half & on_ground for half in halves])
+    surprise_at = np.maximum(surprise, np.where(in_band, as_ink, 0))
+    paper, ink, *between = (
+        np.where(seen, np.log(((1 - surprise_at) * of + surprise_at * _ANY) / anything), 0)
+        * weight[:, None, None]
+        for of in densities
+    )
+    ground = [paper[..., half & on_ground].sum(axis=2) for half in halves]
+    beside = list(zip(halves, ground, strict=True))
+    of_halves = np.stack(
+        [
+            np.stack(
+                [of[..., half & in_band].sum(axis=2) + below for half, below in beside], axis=1
+            )
+            for of in (paper, ink, *between)
+        ]
+    )
+    of_halves *= _predicted(of_halves.max(axis=0), weight[:, None])
+    return Evidence(
+        paper=of_halves[0],
+        ink=of_halves[1],
+        between=np.moveaxis(of_halves[2:], 0, 2),
+        typical=_stacked([], of_halves[1]),
+        weight=weight,
+        dot=(ink - paper)[..., in_dot].sum(axis=(1, 2)),
+        lit=surprise[:, 0, 0].astype(np.float32),
+        covered=np.stack([dark[..., half & on_ground].any(axis=2) for half in halves], axis=1),
+        blur=_blur_along(polar, band),
+    )
+
+
+def _predicted(best: np.ndarray, weight: np.ndarray) -> np.ndarray:
+    """Return where light is as predicted, bool, from the best evidence of levels, (k, 2, m) both.
+
+    Light that nothing predicts comes in stretches, each of which has its price. Where the best
+    path through it (Viterbi 1967) leads, levels say nothing of any word.
+    """
+    price = np.float32(-np.log(SURPRISES[0]))
+    gain = np.moveaxis(-best, 2, 0) - _FURTHER * weight
+    # Ahead of an angle and, the other way round, behind it.
+    gains = np.stack([gain, gain[::-1]], axis=1)
+    low, high = (np.array(of, gain.dtype)[:, None, None] for of in ((-price, 0), (0, price)))
+    bounded = np.zeros_like(gains)
+    steps = list(zip(bounded, gains, strict=True))
+    path = np.stack([np.zeros_like(gain[0]), gain[-1]])
+    for of_step, of_gain in steps[1:] + steps:
+        np.maximum(path, low, out=of_step)
+        np.minimum(of_step, high, out=of_step)
+        np.add(of_step, of_gain, out=path)
+    ahead, behind = bounded[:, 0] + gain, bounded[::-1, 1]
+    return np.moveaxis(ahead + behind <= 0, 0, 2)
+
+
+def _as_ink(
+    polar: PolarImages,
+    level: np.ndarray,
+    noise: np.ndarray,
+    light: np.ndarray,
+    sides: Sequence[np.ndarray],
+) -> np.ndarray:
+    """Return the probabilities that predicted light, of ln (k, m, d), is dark ground, (k, m, d).
+
+    The sides, (d,) each, are of gap and margin. A plate may end beside the band. Where all ground
+    next to the band is evenly lit, light that looks like ink between two readings of it comes from
+    what lies behind the plate.
+    """
+    gap, beyond = np.flatnonzero(sides[0]), np.flatnonzero(sides[1])[:1]
+    if not gap.size:  # further circles fill it
+        return np.zeros_like(level)
+    near = np.append(gap, beyond)
+    ground, width = (of[..., near].reshape(len(of), -1) for of in (level, noise))
+    apart = np.abs(ground - medians(ground)[:, None])
+    uneven = (apart**2 > LIGHT_EDGE**2 + 4 * width**2).mean(axis=1)
+    even = SURPRISES[0] / np.clip(uneven, *SURPRISES).astype(np.float32)[:, None, None]
+    of_gap = level[..., gap].mean(axis=2, keepdims=True)
+    between = np.abs(level[..., beyond] - of_gap) < LIGHT_EDGE
+    dark = (of_gap - light) * polar.polarity[:, None, None] > LIGHT_EDGE
+    return np.where(between & dark, even, 0)
+
+
+def _surprise(errors: np.ndarray, width: np.ndarray, which: np.ndarray) -> np.ndarray:
+    """Return the probabilities that nothing predicts a level, as ground shows them, (k, 1, 1)."""
+    outside = (np.abs(errors) > _UNLIKELY * width) & which
+    share = outside.sum(axis=(1, 2)) / np.maximum(which.sum(axis=(1, 2)), 1)
+    return np.clip(share, *SURPRISES).astype(np.float32)[:, None, None]
+
+
+def normal(values: np.ndarray, spread: np.ndarray) -> np.ndarray:
+    """Return the densities of values under normal distributions about 0."""
+    return np.exp(-0.5 * (values / spread) ** 2) / (spread * math.sqrt(2 * math.pi))

@@ -1,0 +1,261 @@
+"""Reading of the bands about dots, in a line of stages.
+
+Polar images of the dots; the growth of ink; the evidence of edges, which is a bound for what can
+be a target; the evidence of levels in the light that a target's ground predicts; the words; the
+joint fit of dot and band. A right word improves the frame and a better frame the evidence, so that
+evidence, words and fit come twice.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ahf_ros.families.ring.appearance import unlike_print
+from ahf_ros.families.ring.borders import with_ends
+from ahf_ros.families.ring.circles import reach_of, target_circles
+from ahf_ros.families.ring.confidence import rated
+from ahf_ros.families.ring.decoding import CLEAR, DOUBT, Words, decode
+from ahf_ros.families.ring.hypotheses import Hypotheses
+from ahf_ros.families.ring.known import NOTHING_KNOWN, Prior
+from ahf_ros.families.ring.light import clear_of, predicted_light
+from ahf_ros.families.ring.likelihood import (
+    FEW_MARKS,
+    HOPEFUL,
+    SHARES,
+    Evidence,
+    edge_evidence,
+    growth_by,
+    level_evidence,
+)
+from ahf_ros.families.ring.polar import (
+    DEPTHS,
+    DOT,
+    GAP,
+    MARGIN,
+    PART,
+    PolarImages,
+    angles_of,
+    on_dark_ground,
+    polar_images,
+)
+from ahf_ros.prints.ring import Family, least_marked
+from ahf_ros.vision import frame
+from ahf_ros.vision.black import lifted
+from ahf_ros.vision.circle_fit import ENOUGH, Fit, fit_circles
+from ahf_ros.vision.sampling import sample_circles
+
+PER_SECTOR = 10
+"""Angles of a sector at which bands are read."""
+
+_PROPORTION = 0.06  # by which bands may be larger or smaller beside their dots than printed
+_THIN = 1.5  # width of a band, in deviations of blur, up to which its dot alone is measured
+_SHIFTS = np.arange(-2.4, 2.41, 0.4)  # of edges, that are tried, px
+
+
+def read_bands(
+    gray: np.ndarray,
+    dots: Fit,
+    family: Family,
+    prior: Prior = NOTHING_KNOWN,
+    least: np.ndarray | None = None,
+) -> Hypotheses:
+    """Read the bands about dots, and refine dot and band together: one hypothesis of each dot.
+
+    Words whose log odds against anything, see `Words.seen`, are not above `least`, shape (k,), are
+    not asked for: their dots may be left unread.
+    """
+    least = np.full(len(dots.frames), -np.inf) if least is None else least
+    starts = range(0, max(len(dots.frames), 1), PART)
+    parts = [slice(start, start + PART) for start in starts]
+    return Hypotheses.joined(
+        [_read_part(gray, dots.select(part), family, prior, least[part]) for part in parts]
+    )
+
+
+def _read_part(
+    gray: np.ndarray, dots: Fit, family: Family, prior: Prior, least: np.ndarray
+) -> Hypotheses:
+    unread = Hypotheses.unread(dots, family)
+    if not len(dots.frames):
+        return unread
+    hopeful = HOPEFUL * min(1.0, least_marked(family) / FEW_MARKS)
+    polar = polar_images(gray, dots, family.band, family.bits * PER_SECTOR)
+    polar = on_dark_ground(polar, family.band)
+    growth = best_growth(polar, family.band, prior)
+    edges = edge_evidence(polar, 1 - growth, growth, family.band, SHARES)
+    words = decode(edges, _overhang(growth, family), family, prior.expected, looks=False)
+    read = np.flatnonzero(_mean_odds(words, edges.weight) > hopeful)
+    if not read.size:
+        return unread
+    edges, growth = edges.select(read), growth[read]
+    printed = dots.select(read)
+    printed = replace(printed, frames=frame.scaled(printed.frames, 1 - growth))
+    # In the frame of the printed dot, the same growth is a larger share.
+    some = polar.select(read), edges, words.select(read)
+    growth = growth / (1 - growth)
+    words = _settled(gray, printed, *some, growth, family, prior.expected, last=False)
+    good = _mean_odds(words, edges.weight) > hopeful
+    if not good.any():
+        return unread
+    read, growth = read[good], growth[good]
+    printed, words = printed.select(good), words.select(good)
+    fit = _joint_fit(gray, printed, words, PER_SECTOR // 2, 1, family)
+    fit = _by_dot(fit, printed, growth, _thin(printed, growth, family))
+    # A dot and its band are not printed and grown alike: each is read where it was seen.
+    printed = np.abs(fit.proportion - 1) < _PROPORTION
+    bands = replace(fit, frames=frame.scaled(fit.frames, np.where(printed, fit.proportion, 1)))
+    growth = fit.polarity * fit.edge_shift / bands.size
+    polar = polar_images(gray, bands, family.band, family.bits * PER_SECTOR)
+    polar = on_dark_ground(polar, family.band, fit.share >= ENOUGH)
+    edges = edge_evidence(polar, np.ones(len(read)), growth, family.band, SHARES)
+    words = decode(edges, _overhang(growth, family), family, prior.expected)
+    # What is seen against anything is that of edges alone, whatever else there is.
+    enough = _of_reading(words.seen, words, edges.weight) > hopeful
+    asked = np.flatnonzero(enough & (words.seen > least[read]))
+    if not asked.size:
+        return unread
+    if asked.size < read.size:
+        read, growth = read[asked], growth[asked]
+        fit, bands = fit.select(asked), bands.select(asked)
+        polar, edges, words = polar.select(asked), edges.select(asked), words.select(asked)
+    overhang = _overhang(growth, family)
+    words = _settled(gray, bands, polar, edges, words, growth, family, prior.expected, last=True)
+    words = with_ends(polar, words, overhang, family)
+    words = replace(words, unlike=unlike_print(polar, words, growth, overhang, family))
+    good = _mean_odds(words, edges.weight) > hopeful
+    if not good.any():
+        return unread
+    read, dots, words = read[good], fit.select(good), words.select(good)
+    fit = _joint_fit(gray, dots, words, PER_SECTOR, 2, family)
+    fit = _by_dot(fit, dots, growth[good], _thin(dots, growth[good], family))
+    return unread.replaced(read, rated(Hypotheses.of(fit, words, family)))
+
+
+def best_growth(
+    polar: PolarImages, band: tuple[float, float], prior: Prior = NOTHING_KNOWN
+) -> np.ndarray:
+    """Return by how much the colour of dots has grown on all edges, so that these fit best, (k,).
+
+    In the dot radii of the image; a dot that is seen with radius 1 was printed with less.
+    """
+    gray, reach, plate = polar.gray[:, ::2], polar.reach[:, ::2], polar.plate[:, ::2]
+    half = replace(polar, gray=gray, reach=reach, plate=plate)
+    every = half.repeated(len(_SHIFTS))
+    tried = growth_by(np.repeat(_SHIFTS, len(polar.size)), every.size)
+    edges = edge_evidence(every, 1 - tried, tried, band)
+    paper, ink = edges.paper.sum(axis=1), edges.ink.sum(axis=1)
+    # Any ground is as even as paper somewhere, but only a band has ink.
+    score = np.maximum(ink - np.maximum(paper, 0), 0).sum(axis=1).reshape(len(_SHIFTS), -1)
+    unusual = (np.multiply.outer(_SHIFTS, polar.polarity) - prior.shift) / prior.deviation
+    best = (score - 0.5 * unusual**2).argmax(axis=0)
+    return tried.reshape(score.shape)[best, np.arange(len(best))]
+
+
+def _doubtful(words: Words, edges: Evidence) -> np.ndarray:
+    """Return whether edges alone leave a doubt of their words, shape (k,)."""
+    doubtful: np.ndarray = (words.margin < CLEAR) | (words.coded < -DOUBT)
+    return doubtful | words.hidden.any(axis=1) | edges.covered.any(axis=(1, 2))
+
+
+def _settled(
+    gray: np.ndarray,
+    targets: Fit,
+    polar: PolarImages,
+    edges: Evidence,
+    words: Words,
+    growth: np.ndarray,
+    family: Family,
+    expected: frozenset[int],
+    *,
+    last: bool,
+) -> Words:
+    """Return the words of targets, by all evidence where edges alone leave a doubt.
+
+    Targets are in the frames of their printed dots, the unit of the growth of their colour, (k,).
+    What else there is than words is looked at in the `last` reading only.
+    """
+    some = np.flatnonzero(_doubtful(words, edges))
+    if not some.size:
+        return words
+    targets, polar, edges = targets.select(some), polar.select(some), edges.select(some)
+    inner, outer = family.band
+    of_gap, of_band = 1 + (inner - 1) * GAP, inner + (outer - inner) * DEPTHS
+    of_gap, beyond = (of[clear_of(of, family.circles)] for of in (of_gap, outer + MARGIN))
+    radii = np.concatenate([DOT, of_gap, of_band, beyond])
+    angles = angles_of(family.bits * PER_SECTOR)
+    levels = np.maximum(sample_circles(gray, targets.frames, angles, radii), 0)
+    levels = lifted(levels, polar.lift.astype(np.float32)[:, None, None])
+    of_target = targets.frames, polar.lift, angles, radii
+    of_print = family.band, family.circles, polar.rim(outer), polar.contrast
+    light, spread = predicted_light(gray, *of_target, *of_print)
+    growth = growth[some]
+    of_levels = level_evidence(polar, levels, light, spread, radii, growth, family.band, SHARES)
+    evidence = edges.plus(of_levels)
+    overhang = _overhang(growth, family)
+    of_all = decode(evidence, overhang, family, expected, arcs=last, looks=last)
+    hidden = of_all.hidden | (polar.reach < of_band[0])
+    # What speaks against no target is that of edges, so that all targets compare.
+    of_edges = words.select(some)
+    of_all = replace(of_all, seen=of_edges.seen, typical=of_edges.typical, hidden=hidden)
+    return words.replaced(some, of_all)
+
+
+def _thin(printed: Fit, growth: np.ndarray, family: Family) -> np.ndarray:
+    """Return which bands are so thin that blur moves their edges apart, indices.
+
+    The growth of the dots' colour, (k,), is in radii of the printed dots.
+    """
+    inner, outer = family.band
+    width = (outer - inner + 2 * growth) * printed.size
+    return np.flatnonzero(width < _THIN * printed.blur)
+
+
+def _by_dot(fit: Fit, printed: Fit, growth: np.ndarray, which: np.ndarray) -> Fit:
+    """Return joint fits, some of them with the frames of printed dots alone, and their growth."""
+    shift = printed.polarity * growth * printed.size
+    known = np.isfinite(printed.covariance)
+    alone = replace(
+        printed,
+        edge_shift=shift,
+        share=fit.share,
+        deviation=fit.deviation,
+        proportion=np.ones(len(shift)),
+        covariance=np.where(known, printed.covariance, fit.covariance),
+    )
+    return fit.replaced(which, alone.select(which))
+
+
+def _mean_odds(words: Words, weight: np.ndarray) -> np.ndarray:
+    """Return the log odds of words against no target for a reading, shape (k,)."""
+    return _of_reading(np.minimum(words.marked, words.seen), words, weight)
+
+
+def _of_reading(odds: np.ndarray, words: Words, weight: np.ndarray) -> np.ndarray:
+    """Return log odds of words, shape (k,), for a reading."""
+    return odds / (weight * words.hidden.shape[1])
+
+
+def _overhang(growth: np.ndarray, family: Family) -> np.ndarray:
+    """Return by how many angles grown arcs of ink are longer at either end, shape (k,)."""
+    middle = sum(family.band) / 2
+    return growth / middle * (family.bits * PER_SECTOR / (2 * np.pi))
+
+
+def _joint_fit(
+    gray: np.ndarray, start: Fit, words: Words, per_sector: int, rounds: int, family: Family
+) -> Fit:
+    """Return the joint fit of dots and of the marks of their words."""
+    circles = target_circles(words.words, words.starts, start.polarity, per_sector, family)
+    return fit_circles(
+        gray,
+        start.frames,
+        circles,
+        reach=reach_of(family),
+        projective=True,
+        rounds=rounds,
+        blur=start.blur,
+        covariances=rounds > 1,
+        uneven=True,
+    )

@@ -1,0 +1,126 @@
+"""Contradicting readings: resolved where one is clearly better, undecoded where none is."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from ahf_ros.families.ring.confidence import rated
+from ahf_ros.families.ring.contests import resolve
+from ahf_ros.families.ring.decoding import Words
+from ahf_ros.families.ring.hypotheses import Hypotheses
+from ahf_ros.prints.ring import family
+from support.ring import made_up
+
+CODE = family('metashape12')
+RADIUS = 10.0
+
+
+def hypotheses(places: list[float], odds: list[float]) -> Hypotheses:
+    count = len(places)
+    return replace(
+        Hypotheses.unread(made_up(places, radius=RADIUS), CODE),
+        words=np.full(count, 71),
+        marked=np.array(odds, float),
+        confidence=np.ones(count),
+    )
+
+
+def resolved(places, odds, ids, confidence):
+    found = replace(hypotheses(places, odds), confidence=np.array(confidence, float))
+    kept, certain = resolve(found, np.array(ids))
+    return np.flatnonzero(kept).tolist(), certain.tolist()
+
+
+APART, ONE_DOT = [50, 150], [50, 51]
+SURE, FIRST = [True, True], [True, False]
+
+
+@pytest.mark.parametrize(
+    ('places', 'odds', 'ids', 'confidence', 'kept', 'certain'),
+    [
+        pytest.param(APART, [30, 20], [1, 2], SURE, [0, 1], SURE, id='dots apart'),
+        pytest.param(ONE_DOT, [30, 5], [1, 2], SURE, [0], FIRST, id='two readings of a dot'),
+        pytest.param(ONE_DOT, [30, 20], [1, 2], SURE, [0], [False, False], id='a contested dot'),
+        pytest.param(ONE_DOT, [30, 20], [1, 1], SURE, [0], FIRST, id='readings that agree'),
+        pytest.param(ONE_DOT, [30, 20], [1, 2], FIRST, [0], FIRST, id='an uncertain rival'),
+        pytest.param(APART, [30, 29], [1, 1], FIRST, [0, 1], FIRST, id='an uncertain claim'),
+    ],
+)
+def test_readings_that_contradict_each_other(places, odds, ids, confidence, kept, certain):
+    assert resolved(places, odds, ids, confidence) == (kept, certain)
+
+
+def test_of_two_claims_to_an_id_the_clearly_surer_one_stays():
+    places, odds, ids = [50, 150, 250], [30, 20, 10], [1, 2, 1]
+    assert resolved(places, odds, ids, [0.99, 0.98, 0.8])[1] == [True, True, False]
+    assert resolved(places, odds, ids, [0.9, 0.8, 0.76])[1] == [False, True, False]
+
+
+def test_two_targets_beyond_doubt_that_have_one_id_were_printed_twice():
+    assert resolved(APART, [217, 86], [1, 1], [0.999, 0.955])[1] == [False, False]
+
+
+def test_sectors_of_a_band_that_was_read_are_no_dots():
+    """2.9 radii away, between the edges of the band."""
+    places = [50, 50 + 2.9 * RADIUS]
+    assert resolved(places, [30, 20], [1, 1], [True, False])[0] == [0]
+    assert resolved(places, [30, 20], [1, 1], [False, False])[0] == [0, 1]
+
+
+@pytest.mark.parametrize(
+    ('apart', 'confidence', 'on_top'),
+    [
+        (55, [0.99, 0.9], [True, False]),
+        (55, [0.99, 0.98], [False, False]),
+        (70, [0.99, 0.9], [True, True]),
+    ],
+)
+def test_of_two_targets_whose_bands_overlap_only_the_surer_one_is_certain(
+    apart, confidence, on_top
+):
+    places = [50, 50 + apart]
+    assert resolved(places, [90, 80], [1, 2], confidence)[1] == on_top
+    assert resolved(places, [90, 80], [1, 2], [True, False])[1] == [True, False]
+
+
+def test_parts_of_finds_stay_in_order():
+    found = hypotheses([50, 150, 250], [3, 2, 1])
+    parts = [found.select(np.array([2])), found.select(np.array([0, 1]))]
+    assert Hypotheses.joined(parts).marked.tolist() == [1, 3, 2]
+
+
+def test_readings_are_taken_over_where_they_belong():
+    fit, better = made_up([10.0, 20.0], share=0.8), made_up([20.5])
+    unread = Hypotheses.unread(fit, CODE)
+    assert not unread.words.any() and not unread.confidence.any()
+    assert np.isnan(unread.print_growth).all()
+    words = replace(
+        Words.none(1, 120),
+        words=np.array([71]),
+        margin=np.array([13.0]),
+        marked=np.array([150.0]),
+        coded=np.array([20.0]),
+        seen=np.array([100.0]),
+        hidden=np.arange(120)[None] < 12,
+    )
+    found = unread.replaced(np.array([1]), rated(Hypotheses.of(better, words, CODE)))
+    assert found.words.tolist() == [0, 71]
+    assert found.frames[:, 0, 2].tolist() == [10.0, 20.5]
+    assert found.share.tolist() == [0.8, 1.0]
+    assert found.margin.tolist() == [0.0, 13.0]
+    assert found.hidden.tolist() == [0.0, 0.1]
+    assert found.deviation.tolist() == [0.05, 0.05]  # dot radii
+    assert found.print_growth[1] == pytest.approx(-0.3, abs=0.5)
+    assert found.confidence[0] == 0 and found.confidence[1] > 0.9
+    assert fit.frames[1, 0, 2] == 20.0  # what was given is not changed
+    assert not unread.words.any()
+
+
+def test_centres_on_the_dots_of_others():
+    found = hypotheses([50, 150], [2, 1])
+    near = hypotheses([58, 162], [2, 1])
+    assert near.on_dots(found).tolist() == [True, False]
+    assert found.on_dots(found.select(np.zeros(2, bool))).tolist() == [False, False]

@@ -1,0 +1,63 @@
+"""Bright ring targets on dark squares and discs that end where the band does, on white paper."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import pytest
+
+from ahf_ros.families import create_detector
+from ahf_ros.prints.ring import family
+from ahf_ros.scenes.bent.picture import render_bent
+from ahf_ros.scenes.evaluation import score
+from support.pictures.bent import settings
+from support.ring import inked
+
+WHITE, BLACK = 0.7, 0.05  # reflectances
+RADIUS, PITCH = 6.5, 72  # of dots, and between targets, px
+SQUARE = 1.06  # half of its side over the radius of the band
+FINE = 8  # samples across a pixel
+ROWS, COLUMNS = 3, 4
+
+
+def photograph(seed: int) -> tuple[np.ndarray, list[int]]:
+    """Return an image as of a phone, which sharpens, of turned targets, and their IDs."""
+    generator, code = np.random.default_rng(seed), family('cct12')
+    image = np.full((ROWS * PITCH * FINE, COLUMNS * PITCH * FINE), WHITE)
+    numbers = generator.choice(len(code.words), ROWS * COLUMNS, replace=False)
+    across = (np.arange(PITCH * FINE) + 0.5) / FINE - PITCH / 2
+    for place, number in enumerate(numbers):
+        row, column = divmod(place, COLUMNS)
+        turn, (right, down) = generator.uniform(0, 2 * np.pi), generator.uniform(-2, 2, 2)
+        x, y = np.meshgrid((across - right) / RADIUS, (across - down) / RADIUS)
+        x, y = x * np.cos(turn) - y * np.sin(turn), x * np.sin(turn) + y * np.cos(turn)
+        dark = np.maximum(np.abs(x), np.abs(y)) < SQUARE * code.band[1]
+        where = np.s_[row * PITCH * FINE :, column * PITCH * FINE :]
+        part = image[where][: PITCH * FINE, : PITCH * FINE]
+        part[dark & ~inked(x, y, code.words[number], code)] = BLACK
+    light = image.reshape(ROWS * PITCH, FINE, COLUMNS * PITCH, FINE).mean(axis=(1, 3))
+    light = cv2.GaussianBlur(light, (0, 0), 0.8)
+    gray = 255 * light ** (1 / 2.2)
+    gray += 0.8 * (gray - cv2.GaussianBlur(gray, (0, 0), 1.2))
+    gray += generator.normal(0, 1.5, gray.shape)
+    shown = sorted(code.numbers[of] for of in numbers)
+    return np.clip(np.rint(gray), 0, 255).astype(np.uint8), shown
+
+
+def test_targets_are_read_whose_dark_ground_ends() -> None:
+    image, numbers = photograph(5)
+    found = [target.id for target in create_detector(family='cct12')(image)]
+    assert sorted(found) == numbers
+
+
+@pytest.mark.lasting
+@pytest.mark.parametrize(
+    ('light', 'radius', 'least'), [('stripe 0.12', 6, 44), ('fine_stripe 0.12', 10, 46)]
+)
+def test_they_are_read_under_stripes(light: str, radius: int, least: int) -> None:
+    """Ink in the light is as bright as paper in shadow; 18 and 20 were read."""
+    picture = render_bent(settings('metashape12', 'bright', light, radius, 402, 54))
+    found = create_detector(family='metashape12')(picture.image)
+    seen = score(picture.targets, found)
+    assert seen.right >= least
+    assert seen.wrong <= 2

@@ -1,0 +1,93 @@
+"""Targets of any size and blur: none is passed over, and centres are those of sharp edges."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from ahf_ros.families import DetectorSettings
+from ahf_ros.families.ring.counting import estimate_count
+from ahf_ros.prints import VENDOR_NAMES
+from ahf_ros.scenes.evaluation import score
+from ahf_ros.scenes.scene import SceneSettings, render
+from support.collage import Collage, collage
+from support.scenes import counts, identified
+from support.square_markers import needs_square_markers
+
+pytestmark = pytest.mark.lasting
+
+MAXIMUM_ERROR = 0.05
+"""Of a centre of any size, px."""
+
+SQUARE = 'aruco_4x4_50'
+VENDORS = ','.join(VENDOR_NAMES)
+
+
+def check(shown: Collage, family: str) -> None:
+    """Assert that all targets are identified, with good centres, and nothing else."""
+    figures = score(shown.truth, identified(shown.image, 'auto', family=family))
+    assert counts(figures) == (len(shown.truth), 0, 0)
+    assert np.abs(figures.errors).max() < MAXIMUM_ERROR
+
+
+@pytest.mark.parametrize(
+    ('printed', 'radii', 'read'),
+    [
+        ('metashape12', [300.0, 100.0, 65.0, 20.0, 8.0, 4.0], 'metashape12'),
+        ('aicon14', [115.0, 95.0], VENDORS),
+        ('dots', [185.0, 95.0, 20.0, 8.0], 'dots'),
+        ('gsi', [60.0, 20.0, 5.0], 'gsi'),
+        pytest.param(SQUARE, [150.0, 20.0, 6.0], SQUARE, marks=needs_square_markers),
+    ],
+)
+def test_dots_of_any_size_in_one_image(printed, radii, read):
+    check(collage(radii, printed, seed=5 if read == VENDORS else 0), read)
+
+
+@pytest.mark.parametrize(('light', 'polarity'), [('stripe', 'bright'), ('lattice', 'dark')])
+def test_large_dots_in_projected_light_that_are_seen_from_the_side(light, polarity):
+    shown = collage(
+        [150.0, 65.0, 20.0], light=light, ambient=0.12, tilt=40.0, polarity=polarity, seed=3
+    )
+    check(shown, 'metashape12')
+    assert estimate_count(shown.image, DetectorSettings(family='metashape12')) == len(shown.truth)
+
+
+def test_limits_are_obeyed_at_every_size():
+    shown = collage([100.0, 50.0, 20.0])
+    ids = [target.id for target in shown.truth]
+    for limits, expected in (
+        ({'max_radius': 80.0}, ids[1:]),
+        ({'min_radius': 80.0}, ids[:1]),
+        ({'min_radius': 30.0, 'max_radius': 80.0}, ids[1:2]),
+        ({'min_radius': 2000.0}, []),
+    ):
+        found = identified(shown.image, **limits)
+        assert sorted(target.id for target in found) == sorted(expected)
+
+
+@pytest.mark.parametrize(
+    ('changes', 'missed', 'deviation', 'least'),
+    [
+        ({'targets': 40, 'dot_radius': 14, 'tilt': 45.0, 'blur': 0.7}, 0, 0.02, 1.0),
+        ({'targets': 30, 'dot_radius': 14}, 2, 0.02, 0.2),
+        ({'targets': 30, 'dot_radius': 14, 'light': 'fringe'}, 2, 0.06, 0.2),
+        ({'targets': 4, 'dot_radius': 10, 'family': 'gsi'}, 2, 0.04, 0.2),
+        ({'targets': 8, 'dot_radius': 14, 'family': 'dots'}, 2, 0.04, 0.2),
+    ],
+    ids=['oblique', 'soft', 'under fringes', 'gsi', 'dots'],
+)
+def test_centres_are_as_right_as_they_say(changes, missed, deviation, least):
+    scene = render(
+        SceneSettings(**{'width': 1400, 'height': 1000, 'blur': 2, 'seed': 31} | changes)
+    )
+    truth = {target.id: target for target in scene.targets}
+    found = identified(scene.image, 'auto', family=scene.settings.family)
+    assert len(found) >= len(truth) - missed
+    assert {it.id for it in found} <= set(truth)
+    errors = np.array([(it.x - truth[it.id].x, it.y - truth[it.id].y) for it in found])
+    covariances = np.array([it.covariance for it in found]).reshape(-1, 2, 2)
+    assert np.sqrt((errors**2).sum(axis=1).mean()) < deviation
+    assert np.hypot(*errors.T).max() < 5 * deviation
+    squares = np.einsum('ki,kij,kj->k', errors, np.linalg.inv(covariances), errors)
+    assert least < squares.mean() < 4  # 2 where covariances are right
