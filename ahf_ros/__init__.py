@@ -11,14 +11,14 @@ _MODULES = {
     'DETECTOR_NAMES': 'families',
     'FAMILY_NAMES': 'families',
     'UNDECODED': 'base.target',
-    'AdaptiveSettings': 'filtering.settings',
+    'AdaptiveSettings': 'identification.filtering.settings',
     'Detector': 'families',
     'DetectorSettings': 'families',
     'DottedTarget': 'base.target',
     'FilterState': 'base.target',
     'Identification': 'base.target',
-    'IdentificationSettings': 'session_settings',
-    'Identifier': 'filtering.identifier',
+    'IdentificationSettings': 'identification.session_settings',
+    'Identifier': 'identification.filtering.identifier',
     'ImageStack': 'vision.stack',
     'SceneSettings': 'scenes.scene',
     'SearchTrace': 'base.target',
@@ -29,9 +29,9 @@ _MODULES = {
     'adjust': 'network.adjustment',
     'compare': 'network.congruence',
     'create_detector': 'families',
-    'create_identifier': 'session',
+    'create_identifier': 'identification.session',
     'draw': 'drawing.overlay',
-    'identify': 'session',
+    'identify': 'identification.session',
     'orient': 'network.orient',
     'read_image': 'files.image_files',
     'render': 'scenes.scene',
@@ -58,8 +58,13 @@ if TYPE_CHECKING:  # which takes what is imported `as` itself for public
     from ahf_ros.families import create_detector as create_detector
     from ahf_ros.files.image_files import read_image as read_image
     from ahf_ros.files.image_files import write_image as write_image
-    from ahf_ros.filtering.identifier import Identifier as Identifier
-    from ahf_ros.filtering.settings import AdaptiveSettings as AdaptiveSettings
+    from ahf_ros.identification.filtering.identifier import Identifier as Identifier
+    from ahf_ros.identification.filtering.settings import AdaptiveSettings as AdaptiveSettings
+    from ahf_ros.identification.session import create_identifier as create_identifier
+    from ahf_ros.identification.session import identify as identify
+    from ahf_ros.identification.session_settings import (
+        IdentificationSettings as IdentificationSettings,
+    )
     from ahf_ros.network.adjustment import adjust as adjust
     from ahf_ros.network.congruence import compare as compare
     from ahf_ros.network.orient import orient as orient
@@ -67,9 +72,6 @@ if TYPE_CHECKING:  # which takes what is imported `as` itself for public
     from ahf_ros.scenes.evaluation import score as score
     from ahf_ros.scenes.scene import SceneSettings as SceneSettings
     from ahf_ros.scenes.scene import render as render
-    from ahf_ros.session import create_identifier as create_identifier
-    from ahf_ros.session import identify as identify
-    from ahf_ros.session_settings import IdentificationSettings as IdentificationSettings
     from ahf_ros.vision.stack import ImageStack as ImageStack
 else:
     __all__ = list(_MODULES)

@@ -31,11 +31,11 @@ from ahf_ros.families import Contesting, create_detector
 from ahf_ros.families.contract import DetectorSettings
 from ahf_ros.families.learning.rings import LearntFamily, learn_families
 from ahf_ros.families.ring.bands import DotsOfOctave, bands_about, dots_in
+from ahf_ros.identification.settling import evident, still_shown
 from ahf_ros.prints import SQUARE_NAMES
 from ahf_ros.prints.families import AUTO, prints_of
 from ahf_ros.prints.ring import FAMILY_NAMES, Family, words_of_print
 from ahf_ros.prints.square import has_dictionary
-from ahf_ros.settling import evident, still_shown
 from ahf_ros.vision.dot_search import whole_dots
 from ahf_ros.vision.image import as_gray, check_image
 from ahf_ros.vision.pyramid import MAXIMUM_RADIUS, image_pyramid

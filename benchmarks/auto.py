@@ -14,11 +14,11 @@ from itertools import product
 import numpy as np
 
 from ahf_ros.base.target import Target, TrueTarget
+from ahf_ros.identification.session import identify
 from ahf_ros.prints.families import AUTO, FAMILY_NAMES, print_in
 from ahf_ros.scenes.evaluation import score, total
 from ahf_ros.scenes.patterns import LIGHT_NAMES, benchmark_lights
 from ahf_ros.scenes.scene import SceneSettings, render
-from ahf_ros.session import identify
 from benchmarks import report
 
 RADII = {'gsi': 4.0, 'cctag': 24.0}

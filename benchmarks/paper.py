@@ -31,8 +31,8 @@ import numpy as np
 
 from ahf_ros.base.target import Identification
 from ahf_ros.families import Drafter, Refiner, create_detector
-from ahf_ros.filtering.identifier import Identifier
-from ahf_ros.filtering.settings import (
+from ahf_ros.identification.filtering.identifier import Identifier
+from ahf_ros.identification.filtering.settings import (
     EXTENDED,
     PUBLISHED,
     AdaptiveSettings,
@@ -97,7 +97,7 @@ class Method:
     preprocessor : str
         Name in `PREPROCESSORS`; '' for none.
     search : str
-        What AHF tunes, see `ahf_ros.filtering.genes`.
+        What AHF tunes, see `ahf_ros.identification.filtering.genes`.
     """
 
     name: str

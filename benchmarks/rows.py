@@ -13,9 +13,9 @@ import numpy as np
 
 from ahf_ros.base.target import Target, TrueTarget
 from ahf_ros.families import DetectorSettings, create_detector
+from ahf_ros.identification.session import identify
 from ahf_ros.scenes.evaluation import RIGHT, Score, judge, score, total
 from ahf_ros.scenes.scene import SceneSettings, render
-from ahf_ros.session import identify
 from benchmarks.report import progress
 
 Truth = Sequence[TrueTarget | Target]

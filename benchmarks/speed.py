@@ -28,12 +28,17 @@ import numpy as np
 
 from ahf_ros.base.target import count_codes
 from ahf_ros.families import Drafter, create_detector
-from ahf_ros.filtering.genes import genes_of
-from ahf_ros.filtering.genetic import search
-from ahf_ros.filtering.homomorphic import HomomorphicFilter, median_distance
-from ahf_ros.filtering.settings import PUBLISHED, FilterSettings, GeneticSettings, TuningSettings
+from ahf_ros.identification.filtering.genes import genes_of
+from ahf_ros.identification.filtering.genetic import search
+from ahf_ros.identification.filtering.homomorphic import HomomorphicFilter, median_distance
+from ahf_ros.identification.filtering.settings import (
+    PUBLISHED,
+    FilterSettings,
+    GeneticSettings,
+    TuningSettings,
+)
+from ahf_ros.identification.session import create_identifier, identify
 from ahf_ros.scenes.scene import SceneSettings, render
-from ahf_ros.session import create_identifier, identify
 from ahf_ros.vision.logarithm import mapping
 from benchmarks.report import machine, machine_text, table
 from support.fourier import distances, sampled

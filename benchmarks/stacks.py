@@ -21,11 +21,11 @@ from typing import Any
 import numpy as np
 
 from ahf_ros.base.target import Identification
+from ahf_ros.identification.session import create_identifier
+from ahf_ros.identification.session_settings import StackSettings
+from ahf_ros.identification.stream import identify_parts
 from ahf_ros.scenes.patterns import LIGHT_NAMES
 from ahf_ros.scenes.scene import SceneSettings, render
-from ahf_ros.session import create_identifier
-from ahf_ros.session_settings import StackSettings
-from ahf_ros.stream import identify_parts
 from benchmarks import report
 from benchmarks.report import number
 from benchmarks.rows import Row

@@ -20,7 +20,7 @@ import numpy as np
 
 from ahf_ros.base.target import Target
 from ahf_ros.families import create_detector
-from ahf_ros.settling import evident
+from ahf_ros.identification.settling import evident
 from benchmarks import report
 from support.pictures.textures import lookalikes, textured_image
 

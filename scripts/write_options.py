@@ -7,7 +7,7 @@ from pathlib import Path
 from ahf_ros.base.settings.nested import flat_parameters
 from ahf_ros.base.settings.parameter import Parameter
 from ahf_ros.families import DetectorSettings
-from ahf_ros.session_settings import IdentificationSettings
+from ahf_ros.identification.session_settings import IdentificationSettings
 
 FILE = Path(__file__).resolve().parent.parent / 'ahf_ros' / 'base' / 'options.py'
 OWN = ('detector',)  # an argument of its own, which may be a function as well

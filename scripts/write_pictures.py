@@ -28,7 +28,7 @@ from ahf_ros.families.ring.likelihood import (
     level_evidence,
 )
 from ahf_ros.families.ring.polar import angles_of, polar_images
-from ahf_ros.filtering.homomorphic import HomomorphicFilter
+from ahf_ros.identification.filtering.homomorphic import HomomorphicFilter
 from ahf_ros.prints.designs import contours
 from ahf_ros.prints.families import print_in
 from ahf_ros.prints.printing.drawing import Drawing, Ink

@@ -1,6 +1,6 @@
 """The homomorphic filter as published: Eq. (1) to (7) of [1]_ by Fourier transforms.
 
-It is the reference of `ahf_ros.filtering.homomorphic`, about 30 times slower.
+It is the reference of `ahf_ros.identification.filtering.homomorphic`, about 30 times slower.
 
 References
 ----------
@@ -11,8 +11,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ahf_ros.filtering.homomorphic import Transfer, transfer
-from ahf_ros.filtering.settings import FilterSettings
+from ahf_ros.identification.filtering.homomorphic import Transfer, transfer
+from ahf_ros.identification.filtering.settings import FilterSettings
 from ahf_ros.vision.logarithm import logarithm, mapping, sample_lattice
 
 

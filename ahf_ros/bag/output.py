@@ -29,7 +29,7 @@ from ahf_ros.bag.source import METADATA, Source, read_metadata
 from ahf_ros.base.opening import check_regular, parsing
 from ahf_ros.base.parsed_yaml import parsed_yaml
 from ahf_ros.base.writing import place, write_whole
-from ahf_ros.filtering.identifier import Memory
+from ahf_ros.identification.filtering.identifier import Memory
 
 JOURNAL = 'unfinished.sqlite'
 

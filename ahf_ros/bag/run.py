@@ -46,9 +46,18 @@ from ahf_ros.drawing.overlay import draw
 from ahf_ros.families import create_detector
 from ahf_ros.families.contract import Unavailable
 from ahf_ros.files.target_messages import coded_target_array, unanswered
-from ahf_ros.session_settings import IdentificationSettings, StackSettings
-from ahf_ros.settling import settled_families
-from ahf_ros.stream import STATUS, Answer, Frame, Kind, Remark, Stream, message_frame, why_failed
+from ahf_ros.identification.session_settings import IdentificationSettings, StackSettings
+from ahf_ros.identification.settling import settled_families
+from ahf_ros.identification.stream import (
+    STATUS,
+    Answer,
+    Frame,
+    Kind,
+    Remark,
+    Stream,
+    message_frame,
+    why_failed,
+)
 
 WRITING_ERRORS = (OSError, sqlite3.Error, WriterError)
 """Errors of writing a bag, such as a full disk or a folder without permission."""

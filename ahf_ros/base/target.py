@@ -276,7 +276,7 @@ class SearchTrace:
     Attributes
     ----------
     reason : str
-        Why the search ended, see `ahf_ros.filtering.genetic.SearchResult`.
+        Why the search ended, see `ahf_ros.identification.filtering.genetic.SearchResult`.
     discrepancies : tuple of int
         |N - n| through each filter.
     gamma_high, gamma_low, cutoff, attenuation : tuple of float

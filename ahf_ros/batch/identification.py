@@ -23,10 +23,10 @@ from ahf_ros.drawing.overlay import draw, summary
 from ahf_ros.families import Detector, DetectorSettings, create_detector
 from ahf_ros.files.image_files import read_noted_image, write_image
 from ahf_ros.files.target_json import to_json
-from ahf_ros.session import create_identifier
-from ahf_ros.session_settings import IdentificationSettings
-from ahf_ros.settling import memory_of
-from ahf_ros.stream import identify_parts, refusal
+from ahf_ros.identification.session import create_identifier
+from ahf_ros.identification.session_settings import IdentificationSettings
+from ahf_ros.identification.settling import memory_of
+from ahf_ros.identification.stream import identify_parts, refusal
 from ahf_ros.vision.image import check_image, white_remark
 
 

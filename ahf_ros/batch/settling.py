@@ -11,9 +11,9 @@ from ahf_ros.batch.engine import Engine, finished_tasks, in_order
 from ahf_ros.batch.results import outcome_of
 from ahf_ros.batch.task import ImageOutcome, ImageTask
 from ahf_ros.families.evidence import Reading
+from ahf_ros.identification.session_settings import IdentificationSettings
+from ahf_ros.identification.settling import FIRST, evident_together
 from ahf_ros.prints.families import AUTO
-from ahf_ros.session_settings import IdentificationSettings
-from ahf_ros.settling import FIRST, evident_together
 
 _LOOK = {'ahf': False, 'expected_targets': 0, 'estimate_expected': False}
 _MOST = 12  # images that are looked at before any is identified

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 from enum import IntEnum
 from typing import Any
 
-from ahf_ros.session_settings import IdentificationSettings, StackSettings
+from ahf_ros.identification.session_settings import IdentificationSettings, StackSettings
 
 
 class Level(IntEnum):

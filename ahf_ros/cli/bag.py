@@ -34,7 +34,7 @@ from ahf_ros.cli.options import (
 from ahf_ros.clouds.cloud_settings import CloudSettings
 from ahf_ros.clouds.registration_settings import RegistrationSettings
 from ahf_ros.families import is_foreign
-from ahf_ros.session_settings import IdentificationSettings, StackSettings
+from ahf_ros.identification.session_settings import IdentificationSettings, StackSettings
 
 if TYPE_CHECKING:
     from ahf_ros.bag.registration import Registered, RegistrationTask

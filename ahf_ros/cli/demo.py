@@ -21,11 +21,11 @@ from ahf_ros.drawing.overlay import (
 )
 from ahf_ros.drawing.tiles import Tile, side_by_side
 from ahf_ros.files.image_files import write_image
-from ahf_ros.filtering.homomorphic import filtered
+from ahf_ros.identification.filtering.homomorphic import filtered
+from ahf_ros.identification.session import create_identifier
 from ahf_ros.scenes.evaluation import FALSE, RIGHT, WRONG, judge, line, method
 from ahf_ros.scenes.patterns import LIGHT_NAMES
 from ahf_ros.scenes.scene import SceneSettings, render
-from ahf_ros.session import create_identifier
 
 WAYS: dict[str, dict[str, Any]] = {
     'traditional': {'detector': 'traditional', 'ahf': False},

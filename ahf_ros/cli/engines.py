@@ -12,7 +12,7 @@ from ahf_ros.base.settings.nested import updated
 from ahf_ros.batch.engine import Engine, Job, Report, SerialEngine, available_cores, no_report
 from ahf_ros.batch.processes import ProcessEngine
 from ahf_ros.cli import tell
-from ahf_ros.session_settings import IdentificationSettings
+from ahf_ros.identification.session_settings import IdentificationSettings
 
 if TYPE_CHECKING:
     from rich.progress import Progress, ProgressColumn

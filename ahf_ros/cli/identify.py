@@ -40,8 +40,8 @@ from ahf_ros.cli.options import (
     settings_from,
 )
 from ahf_ros.files.files import RESULTS_FILE
+from ahf_ros.identification.session_settings import IdentificationSettings, StackSettings
 from ahf_ros.prints.families import AUTO
-from ahf_ros.session_settings import IdentificationSettings, StackSettings
 
 if TYPE_CHECKING:
     import numpy as np
@@ -178,7 +178,7 @@ class _Seen:
 
     def lines(self, settings: IdentificationSettings, *, drawn: bool) -> Iterator[str]:
         """Yield what there is, and what may help; `drawn` says that overlays show it."""
-        from ahf_ros.settling import families_line
+        from ahf_ros.identification.settling import families_line
 
         if not self.results:
             return
@@ -198,7 +198,7 @@ def check_settings(settings: IdentificationSettings) -> None:
     """
     from ahf_ros.batch.identification import detector_of
     from ahf_ros.families import is_foreign
-    from ahf_ros.session import create_identifier
+    from ahf_ros.identification.session import create_identifier
 
     if not is_foreign(settings.detector):
         create_identifier(detector=detector_of(settings), settings=settings)

@@ -15,9 +15,9 @@ from ahf_ros.base.settings.parameter import Parameter, parameters
 from ahf_ros.clouds.cloud_settings import CloudSettings
 from ahf_ros.clouds.registration_settings import RegistrationSettings
 from ahf_ros.families.contract import DetectorSettings
-from ahf_ros.filtering.settings import AdaptiveSettings
+from ahf_ros.identification.filtering.settings import AdaptiveSettings
+from ahf_ros.identification.session_settings import IdentificationSettings
 from ahf_ros.prints.families import files_by_name
-from ahf_ros.session_settings import IdentificationSettings
 
 Settings = TypeVar('Settings')
 Value = TypeVar('Value')

@@ -23,12 +23,12 @@ from ahf_ros.cli.options import (
 )
 from ahf_ros.clouds.cloud_settings import CloudSettings
 from ahf_ros.clouds.registration_settings import RegistrationSettings
-from ahf_ros.session_settings import IdentificationSettings
+from ahf_ros.identification.session_settings import IdentificationSettings
 
 if TYPE_CHECKING:
     import numpy as np
 
-    from ahf_ros.filtering.identifier import Identifier
+    from ahf_ros.identification.filtering.identifier import Identifier
 
 _CLOUDS = ('.ply', '.pcd')
 
@@ -68,7 +68,7 @@ def run(options: argparse.Namespace) -> int:
     from ahf_ros.clouds.registration_files import write_registration
     from ahf_ros.clouds.scans import Scans, known_targets
     from ahf_ros.files.cloud_files import read_cloud
-    from ahf_ros.session import create_identifier
+    from ahf_ros.identification.session import create_identifier
 
     identifier = create_identifier(settings=settings)
     clouds = settings_from(options, CloudSettings)

@@ -28,7 +28,7 @@ from ahf_ros.cli.options import (
 )
 from ahf_ros.files.files import RESULTS_FILE
 from ahf_ros.files.image_files import image_suffixes
-from ahf_ros.session_settings import IdentificationSettings
+from ahf_ros.identification.session_settings import IdentificationSettings
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -49,7 +49,7 @@ def to_json(
     are identified together, `stack` holds their paths, `image` is the first, and `split` says why
     a stack was split before it. `upright` says whether images were turned as their orientation
     says. `mapping` holds the other settings of the filter, see
-    `ahf_ros.filtering.homomorphic.FilterSettings`.
+    `ahf_ros.identification.filtering.homomorphic.FilterSettings`.
     """
     height, width = shape
     used = asdict(identification.filter) | dict(mapping or {})

@@ -27,14 +27,14 @@ from std_msgs.msg import Header
 from ahf_ros.base.text import printable
 from ahf_ros.files.image_messages import nanoseconds
 from ahf_ros.files.target_messages import DROPPED
+from ahf_ros.identification.settling import settled_families
+from ahf_ros.identification.stream import STATUS, Answer, Kind, Remark, message_frame, why_refused
 from ahf_ros.msg import CodedTargetArray
 from ahf_ros.nodes.answers import Answers
 from ahf_ros.nodes.diagnostics import Tally, seconds
 from ahf_ros.nodes.pipeline import STOPPING, Pipeline, Stopping
 from ahf_ros.nodes.process import LOG_PERIOD, ProcessNode
 from ahf_ros.nodes.settings import LOSSLESS
-from ahf_ros.settling import settled_families
-from ahf_ros.stream import STATUS, Answer, Kind, Remark, message_frame, why_refused
 
 SEGMENT = 64 * 2**20
 """Size beyond which a file is not continued, bytes. Its space is free once all in it was taken."""

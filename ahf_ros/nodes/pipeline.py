@@ -16,10 +16,10 @@ from ahf_ros.base.text import counted, listed
 from ahf_ros.families import Detector, create_detector
 from ahf_ros.families.contract import Unavailable
 from ahf_ros.files.target_messages import coded_target_array, unanswered
-from ahf_ros.filtering.homomorphic import filtered
+from ahf_ros.identification.filtering.homomorphic import filtered
+from ahf_ros.identification.stream import Answer, Stream
 from ahf_ros.msg import CodedTargetArray
 from ahf_ros.nodes.settings import LOSSLESS, DetectorNodeSettings
-from ahf_ros.stream import Answer, Stream
 
 IN_A_ROW = 10
 """Images with n other than N after which it is said."""

@@ -13,11 +13,11 @@ from ahf_ros.base.text import printable, shown
 from ahf_ros.clouds.cloud_settings import MAXIMUM_TOLERANCE, CloudSettings
 from ahf_ros.clouds.registration_settings import RegistrationSettings, check_frame, unit_parameter
 from ahf_ros.families import DETECTOR, detector_name
+from ahf_ros.identification.session import create_identifier
+from ahf_ros.identification.session_settings import IdentificationSettings, StackSettings
 from ahf_ros.nodes.patience import CONTINUOUS, TRIGGERED, UNKNOWN
 from ahf_ros.prints.families import prints_of
 from ahf_ros.scenes.scene import SceneSettings
-from ahf_ros.session import create_identifier
-from ahf_ros.session_settings import IdentificationSettings, StackSettings
 
 LATEST, LOSSLESS = 'latest', 'lossless'
 """What becomes of images that arrive while another one is being identified."""

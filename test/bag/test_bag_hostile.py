@@ -22,8 +22,8 @@ from ahf_ros.bag.output import finished
 from ahf_ros.bag.run import BagTask, answer_bag
 from ahf_ros.bag.source import Source
 from ahf_ros.families import DetectorSettings
-from ahf_ros.filtering.settings import AdaptiveSettings
-from ahf_ros.session_settings import IdentificationSettings
+from ahf_ros.identification.filtering.settings import AdaptiveSettings
+from ahf_ros.identification.session_settings import IdentificationSettings
 from support import bags, mcap
 from support.hostile import generators, mutated
 

@@ -10,7 +10,7 @@ import pytest
 pytest.importorskip('rosbags', reason='rosbags is not installed')
 
 from ahf_ros.bag.output import JOURNAL, Entry, Journal, begin, begun_with, remove_unfinished
-from ahf_ros.filtering.identifier import Memory
+from ahf_ros.identification.filtering.identifier import Memory
 
 ENTRIES = [
     Entry(

@@ -13,8 +13,8 @@ from ahf_ros.bag.definitions import IMAGE, typestore
 from ahf_ros.bag.run import BagTask, answer_bag
 from ahf_ros.cli import main
 from ahf_ros.families import DetectorSettings
+from ahf_ros.identification.session_settings import IdentificationSettings, StackSettings
 from ahf_ros.scenes.scene import SceneSettings, render
-from ahf_ros.session_settings import IdentificationSettings, StackSettings
 from support import bags
 
 SCENE = SceneSettings(**bags.SCENE, ambient=0.02, phases=4)

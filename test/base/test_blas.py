@@ -9,7 +9,7 @@ from threadpoolctl import ThreadpoolController
 
 from ahf_ros.base.blas import one_blas_thread
 from ahf_ros.base.target import Target
-from ahf_ros.session import create_identifier
+from ahf_ros.identification.session import create_identifier
 
 
 def blas_threads() -> set[int]:

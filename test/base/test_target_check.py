@@ -23,7 +23,7 @@ from ahf_ros.drawing.overlay import draw
 from ahf_ros.families.external.guarded import guarded
 from ahf_ros.files.target_json import to_json
 from ahf_ros.files.target_messages import coded_target_array
-from ahf_ros.session import create_identifier
+from ahf_ros.identification.session import create_identifier
 from support import bags
 
 NAMES = [item.name for item in fields(Target)]

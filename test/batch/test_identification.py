@@ -16,8 +16,8 @@ from ahf_ros.batch import identification
 from ahf_ros.batch.identification import identify_images
 from ahf_ros.batch.task import ImageTask
 from ahf_ros.files.image_files import write_image
+from ahf_ros.identification.session_settings import IdentificationSettings
 from ahf_ros.scenes.scene import SceneSettings, render
-from ahf_ros.session_settings import IdentificationSettings
 
 SCENE = SceneSettings(
     width=320, height=240, targets=3, dot_radius=10, light='stripe', ambient=0.04, seed=2

@@ -19,7 +19,7 @@ from ahf_ros.cli import main
 from ahf_ros.files.files import RESULTS_FILE
 from ahf_ros.files.image_files import write_image
 from ahf_ros.files.target_json import read_results
-from ahf_ros.session_settings import IdentificationSettings
+from ahf_ros.identification.session_settings import IdentificationSettings
 from support.disk import room_for
 
 

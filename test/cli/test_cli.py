@@ -16,9 +16,9 @@ import pytest
 from ahf_ros.base.settings.nested import flat_parameters
 from ahf_ros.files.image_files import read_image, write_image
 from ahf_ros.files.truth_files import read_truth
+from ahf_ros.identification.session_settings import IdentificationSettings
 from ahf_ros.scenes.bent.settings import BentSettings
 from ahf_ros.scenes.scene import SceneSettings
-from ahf_ros.session_settings import IdentificationSettings
 from support.command_line import ahf, status
 
 SCENE = ['--width', '640', '--height', '480', '--targets', '6', '--dot-radius', '10']

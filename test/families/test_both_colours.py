@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from ahf_ros.identification.session import identify
 from ahf_ros.network.export.survey import MeasuredImage, make_survey
 from ahf_ros.scenes.scene import SceneSettings
-from ahf_ros.session import identify
 from support.scenes import rendered
 
 

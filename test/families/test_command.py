@@ -15,7 +15,7 @@ import pytest
 
 from ahf_ros.families import create_detector
 from ahf_ros.families.external import command as module
-from ahf_ros.session import identify
+from ahf_ros.identification.session import identify
 
 IMAGE = np.arange(400, dtype=np.uint8).reshape(20, 20)
 

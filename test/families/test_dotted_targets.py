@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from ahf_ros.families import create_detector
-from ahf_ros.filtering.homomorphic import HomomorphicFilter
+from ahf_ros.identification.filtering.homomorphic import HomomorphicFilter
+from ahf_ros.identification.session import identify
 from ahf_ros.prints.dots import DOTS_DESIGN
 from ahf_ros.scenes.evaluation import score
 from ahf_ros.scenes.scene import Rendering
-from ahf_ros.session import identify
 from support.scenes import counted, errors, rendering
 
 SCENES = {

@@ -11,8 +11,8 @@ import pytest
 from ahf_ros.base.target import UNDECODED, Target
 from ahf_ros.families import DetectorSettings, create_detector
 from ahf_ros.families.ring.refinement import refine_centres
-from ahf_ros.filtering.identifier import Identifier
-from ahf_ros.filtering.settings import AdaptiveSettings, GeneticSettings
+from ahf_ros.identification.filtering.identifier import Identifier
+from ahf_ros.identification.filtering.settings import AdaptiveSettings, GeneticSettings
 from ahf_ros.prints.ring import family
 from ahf_ros.scenes.scene import SceneSettings
 from support.scenes import rendered

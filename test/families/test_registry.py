@@ -26,9 +26,9 @@ from ahf_ros.families import (
     estimator,
 )
 from ahf_ros.families.external.guarded import guarded
+from ahf_ros.identification.session import identify
+from ahf_ros.identification.session_settings import IdentificationSettings
 from ahf_ros.prints.families import KINDS
-from ahf_ros.session import identify
-from ahf_ros.session_settings import IdentificationSettings
 from support.packages import EXAMPLE, write_package
 from support.square_markers import needs_square_markers
 

@@ -18,11 +18,11 @@ from ahf_ros.batch.settling import settled_tasks
 from ahf_ros.batch.task import ImageTask
 from ahf_ros.families import DetectorSettings, Narrowing, check_listed_ids, create_detector
 from ahf_ros.files.image_files import write_image
-from ahf_ros.filtering.identifier import Memory
+from ahf_ros.identification.filtering.identifier import Memory
+from ahf_ros.identification.session import create_identifier
+from ahf_ros.identification.session_settings import IdentificationSettings
+from ahf_ros.identification.settling import evident, settled_families, still_shown
 from ahf_ros.scenes.scene import SceneSettings
-from ahf_ros.session import create_identifier
-from ahf_ros.session_settings import IdentificationSettings
-from ahf_ros.settling import evident, settled_families, still_shown
 from ahf_ros.vision.stack import ImageStack
 from support.command_line import status
 from support.scenes import rendered

@@ -8,12 +8,12 @@ import pytest
 
 from ahf_ros.base.target import Target
 from ahf_ros.families import Detector, create_detector
+from ahf_ros.identification.session import identify
+from ahf_ros.identification.settling import evident
 from ahf_ros.prints import SQUARE_NAMES
 from ahf_ros.prints.square import marker, words
 from ahf_ros.scenes.evaluation import score
 from ahf_ros.scenes.scene import Rendering
-from ahf_ros.session import identify
-from ahf_ros.settling import evident
 from ahf_ros.vision.image import GAMMA
 from support.pictures.textures import textured_image
 from support.scenes import around, counted, rendering

@@ -12,8 +12,8 @@ from ahf_ros.base.target import UNDECODED, Target
 from ahf_ros.families import create_detector
 from ahf_ros.files.image_files import read_image
 from ahf_ros.files.truth_files import read_truth
-from ahf_ros.filtering.genes import BEGINNING, tuned
-from ahf_ros.filtering.homomorphic import HomomorphicFilter
+from ahf_ros.identification.filtering.genes import BEGINNING, tuned
+from ahf_ros.identification.filtering.homomorphic import HomomorphicFilter
 from ahf_ros.scenes.evaluation import score
 from ahf_ros.scenes.scene import Rendering
 from support.photographs import PANEL, needs_photographs

@@ -15,8 +15,8 @@ pytest.importorskip('av', reason='PyAV is not installed')
 import av
 
 from ahf_ros.files.video import VideoDecoder, codec_of
+from ahf_ros.identification.session import identify
 from ahf_ros.scenes.scene import SceneSettings, render
-from ahf_ros.session import identify
 
 SCENE = SceneSettings(width=320, height=240, targets=3, dot_radius=9.0)
 

@@ -14,11 +14,11 @@ pytest.importorskip('rclpy', reason='ROS 2 is not installed')
 from std_msgs.msg import Header
 
 from ahf_ros.base.settings.nested import assemble
+from ahf_ros.identification.stream import message_frame
 from ahf_ros.nodes import pipeline
 from ahf_ros.nodes.messages import image_message
 from ahf_ros.nodes.settings import DetectorNodeSettings
 from ahf_ros.scenes.scene import SceneSettings, render
-from ahf_ros.stream import message_frame
 
 SCENE = SceneSettings(width=1000, height=700, targets=6, light='stripe', seed=2)
 

@@ -41,10 +41,10 @@ from ahf_ros.base.target import (
     sorted_targets,
 )
 from ahf_ros.base.target_check import checked_targets
-from ahf_ros.filtering.genes import BEGINNING, FIRST, genes_of, tuned
-from ahf_ros.filtering.genetic import SearchResult, Values, search
-from ahf_ros.filtering.settings import PUBLISHED, AdaptiveSettings
-from ahf_ros.filtering.trials import DetectorFunction, Trials, confirmed, fused
+from ahf_ros.identification.filtering.genes import BEGINNING, FIRST, genes_of, tuned
+from ahf_ros.identification.filtering.genetic import SearchResult, Values, search
+from ahf_ros.identification.filtering.settings import PUBLISHED, AdaptiveSettings
+from ahf_ros.identification.filtering.trials import DetectorFunction, Trials, confirmed, fused
 from ahf_ros.vision.stack import ImageStack
 
 Refinement = Callable[[np.ndarray, Sequence[Target]], Sequence[Target]]
@@ -67,13 +67,13 @@ class Memory:
     Attributes
     ----------
     filter : tuple of float or None
-        What to try first, see `ahf_ros.filtering.trials.Trials`; None for nothing.
+        What to try first, see `ahf_ros.identification.filtering.trials.Trials`; None for nothing.
     settled : tuple of 2 int or None
         n and N of the last image; None unless N was estimated.
     families : tuple of str
         The families that were found so far; empty unless they are to be settled.
     shown : int
-        How many images have settled them, see `ahf_ros.settling`.
+        How many images have settled them, see `ahf_ros.identification.settling`.
     glanced : int
         In how many parts of images other families have been looked for since; -1 where the next
         image is looked at as a whole.
@@ -244,9 +244,9 @@ class Identifier:
         Identification
             The result with the smallest `|N - n|`; of equally good ones the one from the image as
             received, then the first. With `fusion`, and after a search in vain, that on which this
-            filter and the others agree, see `ahf_ros.filtering.trials`. The evaluations of its
-            filter state are the identifications that led to it; threads may have begun others
-            when the right one was found.
+            filter and the others agree, see `ahf_ros.identification.filtering.trials`. The
+            evaluations of its filter state are the identifications that led to it; threads may
+            have begun others when the right one was found.
 
         Raises
         ------

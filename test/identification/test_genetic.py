@@ -9,8 +9,8 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import pytest
 
-from ahf_ros.filtering.genetic import Gene, decoded, encoded, search
-from ahf_ros.filtering.settings import GeneticSettings
+from ahf_ros.identification.filtering.genetic import Gene, decoded, encoded, search
+from ahf_ros.identification.filtering.settings import GeneticSettings
 
 GENES = HIGH, _ = Gene(1.0, 4.0, 0.1), Gene(0.0, 1.0, 0.01)
 FREE = {'max_evaluations': 0}

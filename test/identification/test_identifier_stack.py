@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from ahf_ros.base.target import Target
-from ahf_ros.filtering.identifier import Identifier, Memory
-from ahf_ros.filtering.settings import AdaptiveSettings, GeneticSettings
+from ahf_ros.identification.filtering.identifier import Identifier, Memory
+from ahf_ros.identification.filtering.settings import AdaptiveSettings, GeneticSettings
 from ahf_ros.vision.stack import COMBINATIONS, ImageStack
 
 GENERATOR = np.random.default_rng(3)

@@ -32,7 +32,7 @@ import cv2
 import numpy as np
 
 from ahf_ros.base.target import FilterState
-from ahf_ros.filtering.settings import FilterSettings
+from ahf_ros.identification.filtering.settings import FilterSettings
 from ahf_ros.vision.image import check_image
 from ahf_ros.vision.logarithm import logarithm, mapping, sample_lattice
 

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from ahf_ros.base.target import UNDECODED, Target, UndecodedTarget, count_codes
-from ahf_ros.filtering.genes import FIRST
-from ahf_ros.filtering.homomorphic import HomomorphicFilter, median_distance
-from ahf_ros.filtering.identifier import Identifier, is_mirrored
-from ahf_ros.filtering.settings import (
+from ahf_ros.identification.filtering.genes import FIRST
+from ahf_ros.identification.filtering.homomorphic import HomomorphicFilter, median_distance
+from ahf_ros.identification.filtering.identifier import Identifier, is_mirrored
+from ahf_ros.identification.filtering.settings import (
     EXTENDED,
     PUBLISHED,
     AdaptiveSettings,
@@ -19,9 +19,9 @@ from ahf_ros.filtering.settings import (
     GeneticSettings,
     TuningSettings,
 )
-from ahf_ros.filtering.trials import CONFIRMED
+from ahf_ros.identification.filtering.trials import CONFIRMED
+from ahf_ros.identification.session import create_identifier
 from ahf_ros.scenes.scene import SceneSettings, render
-from ahf_ros.session import create_identifier
 
 COUNT = 144
 SHORT = AdaptiveSettings(fusion=False, genetic=GeneticSettings(max_evaluations=30))

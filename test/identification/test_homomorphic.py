@@ -6,14 +6,14 @@ import cv2
 import numpy as np
 import pytest
 
-from ahf_ros.filtering import homomorphic
-from ahf_ros.filtering.homomorphic import (
+from ahf_ros.identification.filtering import homomorphic
+from ahf_ros.identification.filtering.homomorphic import (
     HomomorphicFilter,
     blur_taps,
     median_distance,
     transfer,
 )
-from ahf_ros.filtering.settings import FilterSettings
+from ahf_ros.identification.filtering.settings import FilterSettings
 from ahf_ros.vision.logarithm import logarithm
 from support.fourier import distances, filtered_fft, filtered_logarithm_fft, response
 

@@ -25,11 +25,11 @@ from ahf_ros.families import (
     create_detector,
     estimator,
 )
-from ahf_ros.filtering.identifier import Identifier
-from ahf_ros.filtering.trials import DetectorFunction
+from ahf_ros.identification.filtering.identifier import Identifier
+from ahf_ros.identification.filtering.trials import DetectorFunction
+from ahf_ros.identification.session_settings import IdentificationSettings
+from ahf_ros.identification.settling import SettlingIdentifier
 from ahf_ros.prints.families import AUTO
-from ahf_ros.session_settings import IdentificationSettings
-from ahf_ros.settling import SettlingIdentifier
 from ahf_ros.vision.stack import ImageStack
 
 if TYPE_CHECKING:

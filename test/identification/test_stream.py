@@ -9,10 +9,9 @@ import pytest
 
 from ahf_ros.families import create_detector
 from ahf_ros.families.contract import DetectorSettings, Unavailable
-from ahf_ros.scenes.scene import SceneSettings, render
-from ahf_ros.session import create_identifier
-from ahf_ros.session_settings import IdentificationSettings
-from ahf_ros.stream import (
+from ahf_ros.identification.session import create_identifier
+from ahf_ros.identification.session_settings import IdentificationSettings
+from ahf_ros.identification.stream import (
     SLIDING,
     Answer,
     Frame,
@@ -24,6 +23,7 @@ from ahf_ros.stream import (
     identify_parts,
     unmoved_parts,
 )
+from ahf_ros.scenes.scene import SceneSettings, render
 
 SCENE = SceneSettings(
     width=480, height=360, targets=4, dot_radius=12, light='stripe', ambient=0.02, phases=4, seed=2

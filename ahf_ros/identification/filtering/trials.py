@@ -16,10 +16,10 @@ import numpy as np
 
 from ahf_ros.base.target import UNDECODED, Target, count_codes, sorted_targets
 from ahf_ros.base.target_check import checked_targets
-from ahf_ros.filtering.genes import tuned
-from ahf_ros.filtering.genetic import Values
-from ahf_ros.filtering.homomorphic import HomomorphicFilter
-from ahf_ros.filtering.settings import AdaptiveSettings
+from ahf_ros.identification.filtering.genes import tuned
+from ahf_ros.identification.filtering.genetic import Values
+from ahf_ros.identification.filtering.homomorphic import HomomorphicFilter
+from ahf_ros.identification.filtering.settings import AdaptiveSettings
 from ahf_ros.vision.stack import ImageStack
 
 DetectorFunction = Callable[[np.ndarray], list[Target]]

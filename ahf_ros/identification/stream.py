@@ -20,9 +20,9 @@ from ahf_ros.families.contract import Detector, Unavailable
 from ahf_ros.files.image_files import NotedImage
 from ahf_ros.files.image_messages import decode_compressed, decode_image, nanoseconds
 from ahf_ros.files.target_messages import DROPPED, FAILED, REJECTED
-from ahf_ros.filtering.identifier import Identifier, Memory
-from ahf_ros.session import create_identifier
-from ahf_ros.session_settings import SLIDING, IdentificationSettings, StackSettings
+from ahf_ros.identification.filtering.identifier import Identifier, Memory
+from ahf_ros.identification.session import create_identifier
+from ahf_ros.identification.session_settings import SLIDING, IdentificationSettings, StackSettings
 from ahf_ros.vision.image import check_image
 from ahf_ros.vision.movement import Displacement, displacement, find_edges, targets_moved
 from ahf_ros.vision.stack import ImageStack, unlike

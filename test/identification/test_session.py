@@ -10,11 +10,11 @@ import pytest
 from ahf_ros.base.settings.nested import flat_parameters, flat_values, updated
 from ahf_ros.base.target import Target
 from ahf_ros.families import DetectorSettings, create_detector
-from ahf_ros.filtering.settings import AdaptiveSettings
+from ahf_ros.identification.filtering.settings import AdaptiveSettings
+from ahf_ros.identification.session import create_identifier, identify
+from ahf_ros.identification.session_settings import IdentificationSettings
 from ahf_ros.nodes.settings import DetectorNodeSettings
 from ahf_ros.scenes.scene import SceneSettings
-from ahf_ros.session import create_identifier, identify
-from ahf_ros.session_settings import IdentificationSettings
 from support.scenes import rendered
 from support.square_markers import needs_square_markers
 

@@ -8,7 +8,7 @@ tunes
   enough. A small D0 is a wide blur, which removes slow changes of light.
 - the contrast of the output, g^p with an exponent p up to 1. With p near 0 the 8-bit image shows
   ln g. Because g^p = exp(p s), the exponent is a factor of both gains: the four numbers of
-  `ahf_ros.filtering.homomorphic.Transfer` describe every filter of the space.
+  `ahf_ros.identification.filtering.homomorphic.Transfer` describe every filter of the space.
 
 Of a stack of images, the combination that is filtered is one more gene, the last one.
 
@@ -21,9 +21,9 @@ from __future__ import annotations
 
 import math
 
-from ahf_ros.filtering.genetic import Gene, Values
-from ahf_ros.filtering.homomorphic import Transfer, median_distance, transfer
-from ahf_ros.filtering.settings import PUBLISHED, TuningSettings
+from ahf_ros.identification.filtering.genetic import Gene, Values
+from ahf_ros.identification.filtering.homomorphic import Transfer, median_distance, transfer
+from ahf_ros.identification.filtering.settings import PUBLISHED, TuningSettings
 
 FIRST = ((3.1, 0.85, -2.5, 0.0), (4.0, 0.18, -3.0, -2.0), (3.8, 0.85, -0.5, 0.0))
 """Values of the genes of filters that are far apart. Of thirty filters the first two helped `ring`

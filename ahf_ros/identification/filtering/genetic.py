@@ -24,7 +24,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ahf_ros.filtering.settings import GeneticSettings
+from ahf_ros.identification.filtering.settings import GeneticSettings
 
 Values = tuple[float, ...]
 """What a chromosome stands for: one value per gene, in the order of the genes."""

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from ahf_ros.base.settings.parameter import check_parameters, parameter
 from ahf_ros.base.text import counted
 from ahf_ros.families import DETECTOR, DetectorSettings, detector_name, estimator
-from ahf_ros.filtering.settings import AdaptiveSettings
+from ahf_ros.identification.filtering.settings import AdaptiveSettings
 from ahf_ros.vision import MAXIMUM_IMAGES
 
 MAXIMUM_TARGETS = 100_000

@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 
 from ahf_ros.base.target import UNDECODED, Target
-from ahf_ros.filtering.identifier import Identifier
-from ahf_ros.filtering.settings import AdaptiveSettings, GeneticSettings
-from ahf_ros.filtering.trials import fused
+from ahf_ros.identification.filtering.identifier import Identifier
+from ahf_ros.identification.filtering.settings import AdaptiveSettings, GeneticSettings
+from ahf_ros.identification.filtering.trials import fused
 
 
 def at(number: int, x: float, y: float = 50.0) -> Target:

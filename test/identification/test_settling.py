@@ -17,9 +17,9 @@ from ahf_ros.base.target import Target
 from ahf_ros.families import create_detector
 from ahf_ros.families.explained import without_targets
 from ahf_ros.files.image_files import write_image
+from ahf_ros.identification.session import create_identifier, identify
+from ahf_ros.identification.settling import FIRST, evident, evident_together
 from ahf_ros.scenes.scene import SceneSettings, render
-from ahf_ros.session import create_identifier, identify
-from ahf_ros.settling import FIRST, evident, evident_together
 from support.calls import calls_of
 from support.command_line import status
 from support.square_markers import needs_square_markers

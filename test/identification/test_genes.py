@@ -3,10 +3,10 @@ from dataclasses import astuple
 import numpy as np
 import pytest
 
-from ahf_ros.filtering.genes import FIRST, genes_of, tuned
-from ahf_ros.filtering.genetic import decoded, encoded
-from ahf_ros.filtering.homomorphic import median_distance, transfer
-from ahf_ros.filtering.settings import (
+from ahf_ros.identification.filtering.genes import FIRST, genes_of, tuned
+from ahf_ros.identification.filtering.genetic import decoded, encoded
+from ahf_ros.identification.filtering.homomorphic import median_distance, transfer
+from ahf_ros.identification.filtering.settings import (
     EXTENDED,
     PUBLISHED,
     AdaptiveSettings,

@@ -1,0 +1,1 @@
+"""Identifying targets: settings, the search for filters, and images in order."""
