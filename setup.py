@@ -15,7 +15,7 @@ setup(
         'ahf_ros.prints': ['ring_families/*'],
         'ahf_ros.files': ['html/*'],
         'ahf_ros.network.report': ['html/*'],
-        'ahf_ros.report': ['page/*'],
+        'ahf_ros.views.report': ['page/*'],
     },
     # With this an editable installation is one path to the sources, new modules included.
     package_dir={'': '.'},

@@ -30,7 +30,7 @@ _MODULES = {
     'compare': 'network.congruence',
     'create_detector': 'families',
     'create_identifier': 'identification.session',
-    'draw': 'drawing.overlay',
+    'draw': 'views.drawing.overlay',
     'identify': 'identification.session',
     'orient': 'network.orient',
     'read_image': 'files.image_files',
@@ -50,7 +50,6 @@ if TYPE_CHECKING:  # which takes what is imported `as` itself for public
     from ahf_ros.base.target import Target as Target
     from ahf_ros.base.target import TrueTarget as TrueTarget
     from ahf_ros.base.target import UndecodedTarget as UndecodedTarget
-    from ahf_ros.drawing.overlay import draw as draw
     from ahf_ros.families import DETECTOR_NAMES as DETECTOR_NAMES
     from ahf_ros.families import FAMILY_NAMES as FAMILY_NAMES
     from ahf_ros.families import Detector as Detector
@@ -72,6 +71,7 @@ if TYPE_CHECKING:  # which takes what is imported `as` itself for public
     from ahf_ros.scenes.evaluation import score as score
     from ahf_ros.scenes.scene import SceneSettings as SceneSettings
     from ahf_ros.scenes.scene import render as render
+    from ahf_ros.views.drawing.overlay import draw as draw
     from ahf_ros.vision.stack import ImageStack as ImageStack
 else:
     __all__ = list(_MODULES)

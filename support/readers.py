@@ -38,7 +38,7 @@ from ahf_ros.prints.data_file import read_data_file
 from ahf_ros.prints.dots import DOTS_DESIGN, dot_family
 from ahf_ros.prints.gsi import GSI_LIBRARY, point_family
 from ahf_ros.prints.ring import ring_family
-from ahf_ros.report.results import read_results as read_shown
+from ahf_ros.views.report.results import read_results as read_shown
 from support.networks import records, simulated, solution
 
 RING = """family: mine

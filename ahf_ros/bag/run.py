@@ -42,7 +42,6 @@ from ahf_ros.base import ending
 from ahf_ros.base.opening import parsing
 from ahf_ros.base.settings.nested import flat_values
 from ahf_ros.base.writing import locked
-from ahf_ros.drawing.overlay import draw
 from ahf_ros.families import create_detector
 from ahf_ros.families.contract import Unavailable
 from ahf_ros.files.target_messages import coded_target_array, unanswered
@@ -58,6 +57,7 @@ from ahf_ros.identification.stream import (
     message_frame,
     why_failed,
 )
+from ahf_ros.views.drawing.overlay import draw
 
 WRITING_ERRORS = (OSError, sqlite3.Error, WriterError)
 """Errors of writing a bag, such as a full disk or a folder without permission."""

@@ -19,7 +19,6 @@ from ahf_ros.base.target import UNDECODED, Identification, Target, UndecodedTarg
 from ahf_ros.base.text import listed
 from ahf_ros.batch.engine import Report, no_report
 from ahf_ros.batch.task import ImageOutcome, ImageTask, Level, Message
-from ahf_ros.drawing.overlay import draw, summary
 from ahf_ros.families import Detector, DetectorSettings, create_detector
 from ahf_ros.files.image_files import read_noted_image, write_image
 from ahf_ros.files.target_json import to_json
@@ -27,6 +26,7 @@ from ahf_ros.identification.session import create_identifier
 from ahf_ros.identification.session_settings import IdentificationSettings
 from ahf_ros.identification.settling import memory_of
 from ahf_ros.identification.stream import identify_parts, refusal
+from ahf_ros.views.drawing.overlay import draw, summary
 from ahf_ros.vision.image import check_image, white_remark
 
 

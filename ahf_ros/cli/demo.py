@@ -12,20 +12,20 @@ from ahf_ros.base.opening import file_errors
 from ahf_ros.base.settings.parameter import Parameter
 from ahf_ros.base.target import Identification, Target, TrueTarget
 from ahf_ros.cli.options import add_option, output_path
-from ahf_ros.drawing.overlay import (
-    DECODED_COLOUR,
-    MISSED_COLOUR,
-    TEXT_COLOUR,
-    WRONG_COLOUR,
-    overlay,
-)
-from ahf_ros.drawing.tiles import Tile, side_by_side
 from ahf_ros.files.image_files import write_image
 from ahf_ros.identification.filtering.homomorphic import filtered
 from ahf_ros.identification.session import create_identifier
 from ahf_ros.scenes.evaluation import FALSE, RIGHT, WRONG, judge, line, method
 from ahf_ros.scenes.patterns import LIGHT_NAMES
 from ahf_ros.scenes.scene import SceneSettings, render
+from ahf_ros.views.drawing.overlay import (
+    DECODED_COLOUR,
+    MISSED_COLOUR,
+    TEXT_COLOUR,
+    WRONG_COLOUR,
+    overlay,
+)
+from ahf_ros.views.drawing.tiles import Tile, side_by_side
 
 WAYS: dict[str, dict[str, Any]] = {
     'traditional': {'detector': 'traditional', 'ahf': False},

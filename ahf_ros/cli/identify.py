@@ -242,8 +242,8 @@ def _hint(settings: IdentificationSettings, identified: int) -> list[str]:
 
 def _advice(paths: Sequence[str], settings: IdentificationSettings) -> list[str]:
     """Return lines on the first image in which nothing was identified that says why, or on all."""
-    from ahf_ros.advice import advice_on_all
     from ahf_ros.files.image_files import read_image
+    from ahf_ros.views.advice import advice_on_all
     from ahf_ros.vision.image import check_image
 
     def images() -> Iterator[tuple[str, np.ndarray]]:

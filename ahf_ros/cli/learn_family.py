@@ -199,7 +199,7 @@ def _contact_sheet(learnt: LearntFamily, crops: dict[bytes, np.ndarray]) -> np.n
     """Return a picture of one target of each word, uint8, shape (height, width, 3)."""
     import numpy as np
 
-    from ahf_ros.drawing.tiles import Tile, side_by_side
+    from ahf_ros.views.drawing.tiles import Tile, side_by_side
 
     words, first = np.unique(learnt.words, return_index=True)
     shown = [crops[learnt.bands.frames[index].tobytes()] for index in first]

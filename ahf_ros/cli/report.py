@@ -18,8 +18,8 @@ from ahf_ros.cli.options import (
     settings_from,
 )
 from ahf_ros.files.truth_files import read_truth
-from ahf_ros.report.page import ReportSettings, write_page
-from ahf_ros.report.results import read_results
+from ahf_ros.views.report.page import ReportSettings, write_page
+from ahf_ros.views.report.results import read_results
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -14,7 +14,6 @@ from std_msgs.msg import Header
 from visualization_msgs.msg import ImageMarker
 
 from ahf_ros.clouds.matching import Waiting
-from ahf_ros.drawing.overlay import draw
 from ahf_ros.identification.stream import Answer
 from ahf_ros.msg import CodedTargetArray
 from ahf_ros.nodes.cloud import TargetPoints
@@ -31,6 +30,7 @@ from ahf_ros.nodes.process import ProcessNode
 from ahf_ros.nodes.settings import PACKAGES, DetectorNodeSettings
 from ahf_ros.nodes.topics import ANSWERS_KEPT, APRILTAG_DETECTIONS, CODED_TARGETS, DETECTIONS
 from ahf_ros.nodes.undistortion import UndistortedTargets
+from ahf_ros.views.drawing.overlay import draw
 
 
 class _Form(NamedTuple):

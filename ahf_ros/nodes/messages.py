@@ -34,12 +34,12 @@ from ahf_ros.base.target import UNDECODED
 from ahf_ros.clouds.localisation import Positions, labelled
 from ahf_ros.clouds.point_clouds import COVARIANCE, NUMBERS
 from ahf_ros.clouds.registration.field import Field, RegisteredScan
-from ahf_ros.drawing.overlay import DECODED_COLOUR, DOUBTFUL_COLOUR, Colour
 from ahf_ros.files.cloud_files import AXES
 from ahf_ros.files.target_messages import has_corners
 from ahf_ros.msg import CodedTarget, CodedTargetArray
 from ahf_ros.network.transform import Transform
 from ahf_ros.prints.square import library_name
+from ahf_ros.views.drawing.overlay import DECODED_COLOUR, DOUBTFUL_COLOUR, Colour
 
 _DATATYPES = {kind: number for number, kind in NUMBERS.items()}
 _PLACE = [(name, '<f4') for name in AXES] + [('id', '<i4')]

@@ -10,7 +10,6 @@ import numpy as np
 from std_msgs.msg import Header
 
 from ahf_ros import msg
-from ahf_ros.advice import Adviser
 from ahf_ros.base.target import Identification
 from ahf_ros.base.text import counted, listed
 from ahf_ros.families import Detector, create_detector
@@ -20,6 +19,7 @@ from ahf_ros.identification.filtering.homomorphic import filtered
 from ahf_ros.identification.stream import Answer, Stream
 from ahf_ros.msg import CodedTargetArray
 from ahf_ros.nodes.settings import LOSSLESS, DetectorNodeSettings
+from ahf_ros.views.advice import Adviser
 
 IN_A_ROW = 10
 """Images with n other than N after which it is said."""

@@ -19,11 +19,11 @@ from ahf_ros.base.edge_shift import median_edge_shift
 from ahf_ros.base.target import Identification, Target
 from ahf_ros.base.target_check import checked_target, checked_targets
 from ahf_ros.base.text import printable, reason_of, shown
-from ahf_ros.drawing.overlay import draw
 from ahf_ros.families.external.guarded import guarded
 from ahf_ros.files.target_json import to_json
 from ahf_ros.files.target_messages import coded_target_array
 from ahf_ros.identification.session import create_identifier
+from ahf_ros.views.drawing.overlay import draw
 from support import bags
 
 NAMES = [item.name for item in fields(Target)]

@@ -11,8 +11,8 @@ from ahf_ros import SceneSettings, identify, render
 from ahf_ros.base.target import reach_of
 from ahf_ros.prints.dots import DOTS_DESIGN
 from ahf_ros.prints.families import files_by_name
-from ahf_ros.report.page import _reach
-from ahf_ros.report.results import result_from_json
+from ahf_ros.views.report.page import _reach
+from ahf_ros.views.report.results import result_from_json
 from support.command_line import status
 
 MINE = 'family: mine\nbits: 10\nband: [1.6, 2.4]\nwords: all\nnumbers: {first_bit: lowest}\n'

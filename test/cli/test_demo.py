@@ -10,8 +10,8 @@ import pytest
 
 from ahf_ros.base.target import FilterState, Identification, Target
 from ahf_ros.cli.demo import WAYS, tile
-from ahf_ros.drawing.overlay import DECODED_COLOUR, MISSED_COLOUR, WRONG_COLOUR
 from ahf_ros.files.image_files import read_image
+from ahf_ros.views.drawing.overlay import DECODED_COLOUR, MISSED_COLOUR, WRONG_COLOUR
 from support.command_line import status
 
 pytestmark = pytest.mark.lasting

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from ahf_ros.base.target import UNDECODED, DottedTarget, Identification
-from ahf_ros.drawing.overlay import DECODED_COLOUR, DECODING_DOT_COLOUR, draw
 from ahf_ros.families import create_detector
 from ahf_ros.families.gsi.evidence import (
     Evidence,
@@ -20,6 +19,7 @@ from ahf_ros.families.gsi.evidence import (
 from ahf_ros.families.gsi.grouping import Templates
 from ahf_ros.prints.gsi import GSI_LIBRARY, point_family, positions_of, value_of
 from ahf_ros.scenes.scene import Rendering
+from ahf_ros.views.drawing.overlay import DECODED_COLOUR, DECODING_DOT_COLOUR, draw
 from ahf_ros.vision.homography import fit_homographies
 from ahf_ros.vision.pyramid import image_pyramid
 from support.scenes import around, counted, errors, relative_errors, rendering

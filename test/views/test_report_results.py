@@ -12,10 +12,10 @@ import pytest
 
 from ahf_ros.base.target import SquareMarker, TrueTarget
 from ahf_ros.files.image_files import find_image, read_image, write_image
-from ahf_ros.report import images
-from ahf_ros.report.images import fitted, shown_image, thumbnail
-from ahf_ros.report.page import families_of, row
-from ahf_ros.report.results import ImageResult, read_results, result_from_json
+from ahf_ros.views.report import images
+from ahf_ros.views.report.images import fitted, shown_image, thumbnail
+from ahf_ros.views.report.page import families_of, row
+from ahf_ros.views.report.results import ImageResult, read_results, result_from_json
 from ahf_ros.vision.image import stretched_to_8_bit
 from ahf_ros.vision.stack import ImageStack
 from support.results import record, save_image, save_lines, searched, target, undecoded

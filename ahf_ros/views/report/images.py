@@ -17,7 +17,7 @@ import numpy as np
 from ahf_ros.files.image_files import find_image, read_image
 from ahf_ros.identification.filtering.homomorphic import HomomorphicFilter
 from ahf_ros.identification.filtering.settings import FilterSettings
-from ahf_ros.report.results import ImageResult
+from ahf_ros.views.report.results import ImageResult
 from ahf_ros.vision.image import stretched_to_8_bit
 from ahf_ros.vision.stack import ImageStack, unlike
 

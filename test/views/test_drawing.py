@@ -13,8 +13,9 @@ from ahf_ros.base.target import (
     Target,
     UndecodedTarget,
 )
-from ahf_ros.drawing import overlay as overlay_module
-from ahf_ros.drawing.overlay import (
+from ahf_ros.scenes.scene import SceneSettings
+from ahf_ros.views.drawing import overlay as overlay_module
+from ahf_ros.views.drawing.overlay import (
     DECODED_COLOUR,
     DOUBTFUL_COLOUR,
     MISSED_COLOUR,
@@ -26,8 +27,7 @@ from ahf_ros.drawing.overlay import (
     place_labels,
     summary,
 )
-from ahf_ros.drawing.tiles import Tile, side_by_side
-from ahf_ros.scenes.scene import SceneSettings
+from ahf_ros.views.drawing.tiles import Tile, side_by_side
 from support.scenes import rendered
 
 GRAY = np.full((240, 320), 120, np.uint8)

@@ -9,11 +9,11 @@ import cv2
 import numpy as np
 import pytest
 
-from ahf_ros.advice import IN_A_ROW, Adviser, advice, advice_on_all
 from ahf_ros.families import DetectorSettings
 from ahf_ros.files.image_files import write_image
 from ahf_ros.prints.ring import ring_family
 from ahf_ros.scenes.scene import SceneSettings
+from ahf_ros.views.advice import IN_A_ROW, Adviser, advice, advice_on_all
 from support.calls import calls_of
 from support.command_line import status
 from support.scenes import rendered

@@ -17,7 +17,6 @@ from typing import Any
 
 import cv2
 
-from ahf_ros.advice import LOOKED_AT, advice
 from ahf_ros.base.doubt import DOUBTFUL_BELOW, doubt
 from ahf_ros.base.edge_shift import edge_shift_remark
 from ahf_ros.base.opening import parsing
@@ -37,9 +36,10 @@ from ahf_ros.base.writing import whole_file
 from ahf_ros.families.contract import DetectorSettings
 from ahf_ros.files.html_pages import page_script, page_style, page_template, script_json
 from ahf_ros.prints.families import AUTO, prints_in
-from ahf_ros.report.images import Picture, fitted, shown_image, thumbnail
-from ahf_ros.report.results import ImageResult
 from ahf_ros.scenes.evaluation import FALSE, RIGHT, WRONG, judge
+from ahf_ros.views.advice import LOOKED_AT, advice
+from ahf_ros.views.report.images import Picture, fitted, shown_image, thumbnail
+from ahf_ros.views.report.results import ImageResult
 
 _PAGE = Path(__file__).parent / 'page'  # the template, and the styles and scripts that it holds
 _SCRIPTS = ('data', 'table', 'viewer', 'plots', 'details', 'overview', 'main')  # in their order

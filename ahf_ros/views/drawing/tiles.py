@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from ahf_ros.drawing.overlay import FONT, TEXT_COLOUR, Colour
+from ahf_ros.views.drawing.overlay import FONT, TEXT_COLOUR, Colour
 
 _GROUND_COLOUR = (45, 40, 35)
 

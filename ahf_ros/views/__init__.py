@@ -1,0 +1,1 @@
+"""What people look at: reports, overlays, and advice where nothing was found."""
