@@ -3,6 +3,8 @@
 Everything a user needs is here; a name is imported from its module when it is first used.
 """
 
+import sys
+from contextlib import suppress
 from importlib import import_module
 from pkgutil import extend_path
 from typing import TYPE_CHECKING, Any
@@ -79,6 +81,11 @@ else:
 # The generated messages (ahf_ros.msg, ahf_ros.srv) may live in another directory of sys.path:
 # an installed copy when Python runs from a checkout, or the build tree.
 __path__ = extend_path(__path__, __name__)
+
+with suppress(ModuleNotFoundError):  # where a build tree has the generated messages alone
+    from ahf_ros.base.former import FormerModules
+
+    sys.meta_path.append(FormerModules())
 
 
 def __getattr__(name: str) -> Any:
