@@ -8,6 +8,7 @@ import pytest
 
 from ahf_ros.families.square.edges import fit_edges
 from ahf_ros.families.square.frames import SQUARE, Places, centres
+from ahf_ros.vision.image import GAMMA
 
 CORNERS = np.array([[60.3, 50.7], [160.9, 58.2], [152.4, 161.6], [55.1, 149.3]])
 NEAR = np.array([[1.2, -0.7], [-1.1, 0.9], [0.6, 1.3], [-0.8, -1.0]])
@@ -29,9 +30,10 @@ def plane() -> np.ndarray:
 
 def photographed(ink: np.ndarray, light: np.ndarray | float = 200.0) -> np.ndarray:
     """Return gray values, as a camera would blur them, where there is ink or not."""
-    fine = np.where(ink, np.float32(0.25), np.float32(1))
+    fine = np.where(ink, np.float32(0.25**GAMMA), np.float32(1))
     shown = cv2.resize(fine, (WIDTH, HEIGHT), interpolation=cv2.INTER_AREA)
-    return (cv2.GaussianBlur(shown, (0, 0), 0.7) * light).astype(np.float32)
+    gray = cv2.GaussianBlur(shown, (0, 0), 0.7) ** (1 / GAMMA)
+    return (gray * light).astype(np.float32)
 
 
 def drawn(light: np.ndarray | float = 200.0, grown: float = 0.0) -> np.ndarray:
@@ -55,7 +57,7 @@ def test_corners_and_centre():
     fitted = fitted_to(drawn())
     assert np.abs(fitted.corners[0] - CORNERS).max() < 0.03
     assert centre_error(fitted) < 0.01
-    assert fitted.edge_shift[0] == pytest.approx(0, abs=0.03)
+    assert fitted.edge_shift[0] == pytest.approx(0, abs=0.05)
     assert fitted.share[0] > 0.95
     assert np.linalg.eigvalsh(fitted.covariance[0]).min() > 0
     assert np.trace(fitted.covariance[0]) < 0.01**2
@@ -64,7 +66,7 @@ def test_corners_and_centre():
 @pytest.mark.parametrize('shift', [-1.0, -0.4, 0.5, 1.0])
 def test_edges_that_moved_are_known_and_move_neither_corners_nor_centres(shift):
     fitted = fitted_to(drawn(grown=shift))
-    assert fitted.edge_shift[0] == pytest.approx(shift, abs=0.05)
+    assert fitted.edge_shift[0] == pytest.approx(shift, abs=0.1)
     assert np.abs(fitted.corners[0] - CORNERS).max() < 0.1
     assert centre_error(fitted) < 0.02
 

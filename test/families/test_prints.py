@@ -41,7 +41,7 @@ def test_corners_of_a_small_marker():
     assert np.abs(found.corners[0] - CORNERS).max() < 0.06
     assert np.abs(centres(found.corners) - centres(CORNERS[None])).max() < 0.03
     assert found.share[0] > 0.95
-    assert found.edge_shift[0] == pytest.approx(0, abs=0.05)
+    assert 0.2 < found.edge_shift[0] < 0.4  # gray values that are light: as if ink had grown
     deviations = np.sqrt(np.linalg.eigvalsh(found.covariance[0]))
     assert 0 < deviations[0] <= deviations[1] < 0.05
 
