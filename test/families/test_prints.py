@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import cv2
 import numpy as np
-import pytest
 
 from ahf_ros.families.square.frames import SQUARE, Places, centres
 from ahf_ros.families.square.prints import lay_outlines, lay_prints
