@@ -13,6 +13,7 @@ from ahf_ros.base.target import UNDECODED, SquareMarker, Target
 from ahf_ros.prints.square import words
 from ahf_ros.scenes.evaluation import score
 from ahf_ros.scenes.scene import Rendering
+from support.square_markers import needs_square_markers
 
 # How far its print reaches from the centre of a target, in its radius, and where its code is.
 KINDS = {
@@ -36,7 +37,13 @@ DOUBTFUL: dict[str, dict[str, Any]] = {
     'aruco_4x4_50': STRIPES,
     'apriltag_36h11': STRIPES,
 }
-EVERY = pytest.mark.parametrize('family', KINDS)
+EVERY = pytest.mark.parametrize(
+    'family',
+    [
+        pytest.param(it, marks=needs_square_markers if it.startswith(('aruco', 'april')) else ())
+        for it in KINDS
+    ],
+)
 
 
 @cache
@@ -167,6 +174,7 @@ def test_expected_ids_lose_no_target_in_doubt(family: str) -> None:
     assert known.right > without.right or family != 'dots'
 
 
+@needs_square_markers
 def test_an_expected_marker_wins_a_draw() -> None:
     cells = words('aruco_4x4_50')
     turned = np.array([np.rot90(of, turn) for of in cells for turn in range(4)])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import runpy
 import time
+from typing import Any
 
 import numpy as np
 import pytest
@@ -24,6 +25,16 @@ pytestmark = pytest.mark.lasting
 NAMES = 'left', 'right'
 GIVEN = {'driver': 'zivid', 'family': 'metashape12', 'expected_targets': '12'}
 AGAIN = 5.0  # s until a shot whose answer was lost is repeated
+
+
+def placed(answers: list[Any], begin: int) -> list[Any]:
+    """Return the answers to scans of the scanner whose clock began then, ns.
+
+    A scan is sent again where the machine is slow, so that a scanner may have several.
+    """
+    stamps = (it.header.stamp for it in answers)
+    near = [abs(it.sec * 10**9 + it.nanosec - begin) < 5 * 10**11 for it in stamps]
+    return [it for it, is_near in zip(answers, near, strict=True) if is_near]
 
 
 def test_two_scanners_are_registered_in_one_frame(graph: Graph) -> None:
@@ -51,18 +62,18 @@ def test_two_scanners_are_registered_in_one_frame(graph: Graph) -> None:
 
         def registered(number: int = number, name: str = name, begin: int = begin) -> bool:
             nonlocal last
-            if time.monotonic() - last > AGAIN and len(places) <= number:
+            if time.monotonic() - last > AGAIN and not placed(places, begin):
                 last = time.monotonic()
                 stamp = begin + round(last * 1e6)
                 for topic, message in SCANNER['messages'](SCANNER['scan'](number), stamp):
                     if topic in publishers[name]:
                         message.header.frame_id = f'{name}_optical_frame'
                         publishers[name][topic].publish(message)
-            return len(places) > number and len(clouds) > number
+            return bool(placed(places, begin) and placed(clouds, begin))
 
         graph.until(registered)
     of = [SCANNER['scan'](number) for number in range(2)]
-    found = transform_of(places[1])
+    found = transform_of(placed(places, begin)[0])
     rotation = of[0].rotation.T @ of[1].rotation
     translation = of[0].rotation.T @ (of[1].position - of[0].position)
     assert np.abs(found.rotation - rotation).max() < 1e-3
