@@ -186,7 +186,7 @@ class Settings:
 """
 IMPORTING = """
 import sys, time
-from ahf_ros import ending
+from ahf_ros.base import ending
 try:
     with ending.handled():
         import interrupting
