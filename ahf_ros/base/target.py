@@ -137,7 +137,7 @@ class SquareMarker(Target):
 
 @dataclass(frozen=True, slots=True)
 class UndecodedTarget(Target):
-    """A dot with the ID `UNDECODED`, and why it has no other.
+    """A target with the ID `UNDECODED`, and why it has no other.
 
     Attributes
     ----------

@@ -116,7 +116,7 @@ def reported(
         if of_print:
             found.append(target)
         elif of_place and (everything or (contested and is_certain)):
-            found.append(undecoded(target, contested=bool(is_certain)))
+            found.append(undecoded(target, 'contested' if is_certain else 'uncertain'))
     return found
 
 

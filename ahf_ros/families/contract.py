@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any, ClassVar, Protocol, TypeVar, runtime_checkable
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar, runtime_checkable
 
 from ahf_ros.base.settings.parameter import check_parameters, parameter
 from ahf_ros.base.target import Target
@@ -323,20 +323,9 @@ class FamilyDetector(ABC):
     """A detector of one family of targets, whose design is read from the settings.
 
     It raises a ValueError if the family, or the data file that describes it, is not accepted.
-
-    Attributes
-    ----------
-    settings : DetectorSettings
-    expected : frozenset of int
-        IDs that are likely to be there. Empty: all IDs are equally likely.
-    contested : bool
-        Whether targets whose ID others have, too, are among the results, undecoded.
     """
 
     settings: DetectorSettings
-    expected: frozenset[int] = frozenset()
-    contested: bool = False
-    contrast: ClassVar[int] = 1  # see `Searching`
 
     def __post_init__(self) -> None:
         """Refuse what is not accepted before the first image comes."""
@@ -352,13 +341,23 @@ class FamilyDetector(ABC):
     def design(self) -> Any:
         """Printed design of the family."""
 
+
+@dataclass(frozen=True, slots=True)
+class ExpectingDetector(FamilyDetector):
+    """A detector that may know which IDs are likely; see `Expecting`.
+
+    Attributes
+    ----------
+    settings : DetectorSettings
+    expected : frozenset of int
+        IDs that are likely to be there. Empty: all IDs are equally likely.
+    """
+
+    expected: frozenset[int] = frozenset()
+
     def expecting(self, ids: frozenset[int]) -> Self:
         """Return a detector that knows which IDs are likely; see `Expecting`."""
         return replace(self, expected=ids)
-
-    def contesting(self) -> Self:
-        """Return a detector that also returns targets that share an ID; see `Contesting`."""
-        return replace(self, contested=True)
 
 
 def moved_targets(

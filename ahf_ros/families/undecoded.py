@@ -6,16 +6,16 @@ from dataclasses import fields
 
 from ahf_ros.base.target import UNDECODED, Target, UndecodedTarget
 
-UNLIKELY = 0.02
-"""Confidence of an ID below which a target counts as unread."""
+_UNLIKELY = 0.02  # confidence of an ID below which a target counts as unread
 
 _FIELDS = tuple(it.name for it in fields(Target))
 
 
-def undecoded(target: Target, *, contested: bool = False) -> UndecodedTarget:
-    """Return a target without its ID, which is doubtful or which another target contests.
+def undecoded(target: Target, reason: str = 'uncertain') -> UndecodedTarget:
+    """Return a target without its ID, with the reason as in `UndecodedTarget`.
 
-    The likely ID and its family are those of the target, if the ID is likely at all.
+    The likely ID and its family are those of the target. One that is uncertain and has no ID, or
+    one that is not likely at all, is unread.
 
     Examples
     --------
@@ -24,9 +24,9 @@ def undecoded(target: Target, *, contested: bool = False) -> UndecodedTarget:
     """
     known = {name: getattr(target, name) for name in _FIELDS}
     known |= {'id': UNDECODED, 'code': 0, 'family': ''}
-    if target.id == UNDECODED or (not contested and target.confidence < UNLIKELY):
+    unlikely = target.id == UNDECODED or target.confidence < _UNLIKELY
+    if reason == 'uncertain' and unlikely:
         return UndecodedTarget(**known, reason='unread')
-    reason = 'contested' if contested else 'uncertain'
     return UndecodedTarget(
         **known, reason=reason, likely_id=target.id, likely_family=target.family
     )

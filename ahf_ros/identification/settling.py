@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
-from dataclasses import fields, replace
+from dataclasses import replace
 from functools import partial
 from itertools import chain
 from typing import Any
@@ -26,6 +26,7 @@ from ahf_ros.base.target import UNDECODED, Identification, Target, UndecodedTarg
 from ahf_ros.base.target_check import checked_targets
 from ahf_ros.families.evidence import Reading, evidence, is_clear, reading_of
 from ahf_ros.families.explained import without_targets
+from ahf_ros.families.undecoded import undecoded
 from ahf_ros.identification.filtering.genetic import Values
 from ahf_ros.identification.filtering.identifier import Identifier, Memory
 from ahf_ros.identification.filtering.trials import DetectorFunction, Trials
@@ -70,15 +71,7 @@ def evident(targets: Sequence[Target]) -> list[Target]:
 def marked(targets: Sequence[Target]) -> list[Target]:
     """Return targets, those of families that they are no evidence for undecoded."""
     settled = evident(targets)
-    return [it if it in settled else _unsettled(it) for it in targets]
-
-
-def _unsettled(target: Target) -> UndecodedTarget:
-    known: dict[str, Any] = {of.name: getattr(target, of.name) for of in fields(Target)}
-    known |= {'id': UNDECODED, 'code': 0, 'family': ''}
-    return UndecodedTarget(
-        **known, reason='unsettled', likely_id=target.id, likely_family=target.family
-    )
+    return [it if it in settled else undecoded(it, 'unsettled') for it in targets]
 
 
 def evident_together(images: Sequence[Iterable[Reading]]) -> set[str]:

@@ -31,8 +31,8 @@ from ahf_ros.families.cctag.rings import (
     in_light,
     show_the_same,
 )
-from ahf_ros.families.claims import reported
-from ahf_ros.families.contract import FamilyDetector, moved_targets
+from ahf_ros.families.contract import moved_targets
+from ahf_ros.families.pyramid_detector import PyramidDetector
 from ahf_ros.prints import CCTAG_NAMES
 from ahf_ros.prints.cctag import CircleFamily, circle_family
 from ahf_ros.vision import frame
@@ -43,7 +43,7 @@ from ahf_ros.vision.ellipse_targets import ellipse_fields, targets_from_frames
 from ahf_ros.vision.image import as_gray, check_image
 from ahf_ros.vision.large_targets import targets_of_octaves
 from ahf_ros.vision.log_edges import LogEdges, edges_in_bands
-from ahf_ros.vision.pyramid import ImagePyramid, Octave, image_pyramid, octaves
+from ahf_ros.vision.pyramid import ImagePyramid, Octave, octaves
 
 _COLOURS = 1, -1  # of circles that are looked for
 _SMALLEST, _SMALL = 2.0, 11.5  # radii of circles that are looked for, px, also in the half
@@ -70,7 +70,7 @@ _MAXIMUM_MOVE, _MAXIMUM_MOVE_SHARE = 1.0, 0.1  # that a centre is moved: px, rad
 
 
 @dataclass(frozen=True, slots=True)
-class CctagDetector(FamilyDetector):
+class CctagDetector(PyramidDetector):
     """Identify the CCTags of one family or of several."""
 
     name: ClassVar[str] = 'cctag'
@@ -80,12 +80,6 @@ class CctagDetector(FamilyDetector):
     def design(self) -> tuple[CircleFamily, ...]:
         """Printed designs of the families."""
         return self.settings.codes(CircleFamily)
-
-    def __call__(self, image: np.ndarray) -> list[Target]:
-        """Identify the targets of one image; see `Detector`."""
-        check_image(image)
-        gray = as_gray(image)
-        return self.search(image_pyramid(gray, self.settings.max_radius, self.contrast))
 
     @one_blas_thread()
     def search(self, pyramid: ImagePyramid) -> list[Target]:
@@ -98,10 +92,7 @@ class CctagDetector(FamilyDetector):
             return self._identify(octave.pyramid.gray, looks[octave.level])
 
         found = targets_of_octaves(pyramid, radii, identify, self.refine)
-        everything = self.settings.report_undecoded
-        return sorted_targets(
-            reported(found, 1.0, _CERTAIN, everything=everything, contested=self.contested)
-        )
+        return sorted_targets(self.reported(found, 1.0, _CERTAIN))
 
     @one_blas_thread()
     def refine(self, image: np.ndarray, targets: Sequence[Target]) -> list[Target]:

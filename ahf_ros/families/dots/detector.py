@@ -14,23 +14,23 @@ import numpy as np
 
 from ahf_ros.base.blas import one_blas_thread
 from ahf_ros.base.target import DottedTarget, Target, sorted_targets
-from ahf_ros.families.claims import reported
-from ahf_ros.families.contract import DetectorSettings, FamilyDetector, moved_targets
+from ahf_ros.families.contract import DetectorSettings, moved_targets
 from ahf_ros.families.dots.discs import judged, small_discs, voted_discs, whole_discs
 from ahf_ros.families.dots.rings import CERTAIN, Rings, fit_targets, likely_targets, read_discs
+from ahf_ros.families.pyramid_detector import PyramidDetector
 from ahf_ros.prints.dots import DotFamily
 from ahf_ros.vision.ellipse_targets import ellipse_fields
 from ahf_ros.vision.frame import affine_frames, ellipse_axes
 from ahf_ros.vision.image import as_gray, check_image
 from ahf_ros.vision.large_targets import targets_of_octaves
-from ahf_ros.vision.pyramid import ImagePyramid, Octave, image_pyramid
+from ahf_ros.vision.pyramid import ImagePyramid, Octave
 
 _PLAUSIBLE = 0.5  # share of the edges of disc and border
 _MAXIMUM_MOVE, _MAXIMUM_MOVE_SHARE = 1.0, 0.2  # that a centre is moved: px, radii
 
 
 @dataclass(frozen=True, slots=True)
-class DotsDetector(FamilyDetector):
+class DotsDetector(PyramidDetector):
     """Identify rings of dots."""
 
     name: ClassVar[str] = 'dots'
@@ -41,19 +41,11 @@ class DotsDetector(FamilyDetector):
         """Printed design of the family."""
         return self.settings.codes(DotFamily)[0]
 
-    def __call__(self, image: np.ndarray) -> list[Target]:
-        """Identify the targets of one image; see `Detector`."""
-        check_image(image)
-        return self.search(image_pyramid(as_gray(image), self.settings.max_radius))
-
     @one_blas_thread()
     def search(self, pyramid: ImagePyramid) -> list[Target]:
         """Identify the targets of one image; see `Searching`."""
         found = targets_of_octaves(pyramid, self.settings.radii, self._identify, self.refine)
-        everything, reach = self.settings.report_undecoded, self.design.border_radius
-        return sorted_targets(
-            reported(found, reach, CERTAIN, everything=everything, contested=self.contested)
-        )
+        return sorted_targets(self.reported(found, self.design.border_radius, CERTAIN))
 
     @one_blas_thread()
     def refine(self, image: np.ndarray, targets: Sequence[Target]) -> list[Target]:

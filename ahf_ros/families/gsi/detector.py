@@ -18,8 +18,7 @@ import numpy as np
 
 from ahf_ros.base.blas import one_blas_thread
 from ahf_ros.base.target import UNDECODED, DottedTarget, Target, sorted_targets
-from ahf_ros.families.claims import reported
-from ahf_ros.families.contract import DetectorSettings, FamilyDetector, moved_targets
+from ahf_ros.families.contract import DetectorSettings, moved_targets
 from ahf_ros.families.gsi.evidence import find_evidence, likely_templates, read_codes
 from ahf_ros.families.gsi.grouping import FEW, Templates, find_templates
 from ahf_ros.families.gsi.hypotheses import (
@@ -42,6 +41,7 @@ from ahf_ros.families.gsi.refinement import (
     place_targets,
     resized,
 )
+from ahf_ros.families.pyramid_detector import PyramidDetector
 from ahf_ros.families.undecoded import undecoded
 from ahf_ros.prints.gsi import PointFamily
 from ahf_ros.vision import frame
@@ -51,7 +51,7 @@ from ahf_ros.vision.ellipse_targets import ellipse_fields, targets_from_frames
 from ahf_ros.vision.homography import local_frames
 from ahf_ros.vision.image import as_gray, check_image
 from ahf_ros.vision.large_targets import targets_of_octaves
-from ahf_ros.vision.pyramid import ImagePyramid, Octave, image_pyramid
+from ahf_ros.vision.pyramid import ImagePyramid, Octave
 from ahf_ros.vision.small_dots import small_dots_in
 
 _MARGIN = 0.5  # about the dots of certain targets, dot radii
@@ -62,7 +62,7 @@ _MAXIMUM_MOVE = 1.0  # that the reference point is moved by a refinement, px, or
 
 
 @dataclass(frozen=True, slots=True)
-class GsiDetector(FamilyDetector):
+class GsiDetector(PyramidDetector):
     """Identify point-distributed targets: GSI's, or those that a data file describes."""
 
     name: ClassVar[str] = 'gsi'
@@ -73,21 +73,14 @@ class GsiDetector(FamilyDetector):
         """Printed design of the family."""
         return self.settings.codes(PointFamily)[0]
 
-    def __call__(self, image: np.ndarray) -> list[Target]:
-        """Identify the targets of one image; see `Detector`."""
-        check_image(image)
-        return self.search(image_pyramid(as_gray(image), self.settings.max_radius))
-
     @one_blas_thread()
     def search(self, pyramid: ImagePyramid) -> list[Target]:
         """Identify the targets of one image; see `Searching`."""
         found = targets_of_octaves(pyramid, self.settings.radii, self._identify, self.refine)
         single = [target for target in found if target.id == UNDECODED]
         coded = [target for target in found if target.id != UNDECODED]
-        everything, code = self.settings.report_undecoded, self.design
-        reach = SAME * code.reach / float(code.template_radii[code.reference])
-        coded = reported(coded, reach, CERTAIN, everything=everything, contested=self.contested)
-        return sorted_targets([*coded, *map(undecoded, single)])
+        reach = SAME * self.design.reach / float(self.design.template_radii[self.design.reference])
+        return sorted_targets([*self.reported(coded, reach, CERTAIN), *map(undecoded, single)])
 
     def _identify(self, octave: Octave) -> list[Target]:
         """Return the targets of an octave, in its pixels."""

@@ -15,7 +15,8 @@ import numpy as np
 
 from ahf_ros.base.blas import one_blas_thread
 from ahf_ros.base.target import Target, sorted_targets
-from ahf_ros.families.contract import DetectorSettings, FamilyDetector
+from ahf_ros.families.contract import DetectorSettings
+from ahf_ros.families.pyramid_detector import PyramidDetector
 from ahf_ros.families.ring.bands import with_measured_bands
 from ahf_ros.families.ring.choice import choose_families, further_families
 from ahf_ros.families.ring.contests import among_others, resolve
@@ -44,7 +45,6 @@ from ahf_ros.vision import frame
 from ahf_ros.vision.circle_fit import NO_FITS, Fit
 from ahf_ros.vision.ellipse_targets import targets_from_frames
 from ahf_ros.vision.faint import faint_parts
-from ahf_ros.vision.image import as_gray, check_image
 from ahf_ros.vision.pyramid import ImagePyramid, Octave, image_pyramid, octaves
 
 _PART = 128  # dots of one colour that are read at a time
@@ -52,7 +52,7 @@ _IN_PLACE, _EXACT = 0.6, 0.5  # edges of a dot: least share of them, largest dev
 
 
 @dataclass(frozen=True, slots=True)
-class RingDetector(FamilyDetector):
+class RingDetector(PyramidDetector):
     """Identify ring targets (Schneider type) of one family or of several."""
 
     name: ClassVar[str] = 'ring'
@@ -62,11 +62,6 @@ class RingDetector(FamilyDetector):
     def design(self) -> tuple[Family, ...]:
         """Printed designs of the families."""
         return self.settings.codes(Family)
-
-    def __call__(self, image: np.ndarray) -> list[Target]:
-        """Identify the targets of one image; see `Detector`."""
-        check_image(image)
-        return self.search(image_pyramid(as_gray(image), self.settings.max_radius))
 
     def search(self, pyramid: ImagePyramid) -> list[Target]:
         """Identify the targets of one image; see `Searching`."""
@@ -319,7 +314,7 @@ def report(
     columns = (some.frames, some.covariance, ids[kept], codes[kept], some.confidence)
     targets = targets_from_frames(*columns, names[kept], some.print_growth, some.polarity)
     return sorted_targets(
-        target if is_certain else undecoded(target, contested=is_sure)
+        target if is_certain else undecoded(target, 'contested' if is_sure else 'uncertain')
         for target, is_certain, is_sure in zip(
             targets, certain[kept].tolist(), some.certain.tolist(), strict=True
         )

@@ -16,7 +16,7 @@ import numpy as np
 from ahf_ros.base.blas import one_blas_thread
 from ahf_ros.base.target import SquareMarker, Target, sorted_targets
 from ahf_ros.families.claims import Rivals, owners
-from ahf_ros.families.contract import FamilyDetector, moved_targets
+from ahf_ros.families.contract import ExpectingDetector, moved_targets
 from ahf_ros.families.square.edges import fit_edges
 from ahf_ros.families.square.frames import Places, centres, side_lengths
 from ahf_ros.families.square.margins import decision_margins
@@ -49,7 +49,7 @@ Groups = tuple[tuple[str, ...], ...]
 
 
 @dataclass(frozen=True, slots=True)
-class SquareDetector(FamilyDetector):
+class SquareDetector(ExpectingDetector):
     """Identify the markers of one family or of several."""
 
     @property
@@ -98,7 +98,7 @@ class SquareDetector(FamilyDetector):
         read_as[:, 3] -= _FITTED
         places, rows = np.concatenate([places, found]), np.concatenate([rows, read_as])
         sure = rows[:, 3] > MINIMUM_ODDS
-        doubtful = ~sure & (rows[:, 5] > 0) if everything else np.zeros(len(rows), bool)
+        doubtful = everything & ~sure & (rows[:, 5] > 0)
         together = _odds_together(rows[sure], _one_place(places[sure]), groups)
         odds = np.concatenate([together, np.minimum(rows[doubtful, 3], MINIMUM_ODDS)])
         places, rows = (np.concatenate([of[sure], of[doubtful]]) for of in (places, rows))

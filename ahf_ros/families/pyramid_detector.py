@@ -1,0 +1,54 @@
+"""A base class for detectors that begin with the pyramid of an image."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+
+from ahf_ros.base.target import Target
+from ahf_ros.families.claims import reported
+from ahf_ros.families.contract import ExpectingDetector
+from ahf_ros.vision.image import as_gray, check_image
+from ahf_ros.vision.pyramid import ImagePyramid, image_pyramid
+
+if TYPE_CHECKING:
+    from typing_extensions import Self
+
+
+@dataclass(frozen=True, slots=True)
+class PyramidDetector(ExpectingDetector):
+    """A detector of one family of targets that is `Searching` and `Contesting`.
+
+    Attributes
+    ----------
+    settings : DetectorSettings
+    expected : frozenset of int
+        IDs that are likely to be there. Empty: all IDs are equally likely.
+    contested : bool
+        Whether targets whose ID others have, too, are among the results, undecoded.
+    """
+
+    contested: bool = False
+    contrast: ClassVar[int] = 1  # see `Searching`
+
+    def __call__(self, image: np.ndarray) -> list[Target]:
+        """Identify the targets of one image; see `Detector`."""
+        check_image(image)
+        return self.search(image_pyramid(as_gray(image), self.settings.max_radius, self.contrast))
+
+    @abstractmethod
+    def search(self, pyramid: ImagePyramid) -> list[Target]:
+        """Identify the targets of one image; see `Searching`."""
+
+    def contesting(self) -> Self:
+        """Return a detector that also returns targets that share an ID; see `Contesting`."""
+        return replace(self, contested=True)
+
+    def reported(self, found: Sequence[Target], reach: float, certain: float) -> list[Target]:
+        """Return the targets to report; see `ahf_ros.families.claims.reported`."""
+        everything = self.settings.report_undecoded
+        return reported(found, reach, certain, everything=everything, contested=self.contested)
