@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import cv2
 import numpy as np
@@ -29,17 +30,9 @@ def readers() -> dict[str, Reader]:
 
     found: dict[str, Reader] = {'ahf': create_detector(family=FAMILY), 'opencv': by_opencv}
     try:
-        from pupil_apriltags import Detector
+        pupil = april_tag_detector()
     except ImportError:
         return found
-
-    class Kept(Detector):  # type: ignore[misc]
-        """Never released, as that reads what it has freed (pupil-labs/apriltags, pull 65)."""
-
-        def __del__(self) -> None:
-            pass
-
-    pupil = Kept(families='tag36h11', quad_decimate=1.0)
 
     def by_pupil(image: np.ndarray) -> list[Target]:
         tags = pupil.detect(image)
@@ -47,6 +40,19 @@ def readers() -> dict[str, Reader]:
         return _targets([tag.tag_id for tag in tags], [tag.corners - 0.5 for tag in tags])
 
     return found | {'pupil-apriltags': by_pupil}
+
+
+def april_tag_detector() -> Any:
+    """Return the detector of the AprilTag library; ImportError where it is not installed."""
+    from pupil_apriltags import Detector
+
+    class Kept(Detector):  # type: ignore[misc]
+        """Never released, as that reads what it has freed (pupil-labs/apriltags, pull 65)."""
+
+        def __del__(self) -> None:
+            pass
+
+    return Kept(families='tag36h11', quad_decimate=1.0)
 
 
 def _targets(numbers: Sequence[int], corners: Sequence[np.ndarray]) -> list[Target]:

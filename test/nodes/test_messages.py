@@ -41,6 +41,7 @@ from ahf_ros.nodes.messages import (
     transform_message,
 )
 from ahf_ros.prints.square import marker
+from support.square_readers import april_tag_detector
 
 SEEN = Target(18, 71, 100.0, 50.0, 20.0, 10.0, math.pi / 2, confidence=0.75)
 LOST = Target(UNDECODED, 0, 10.0, 20.0, 5.0, 5.0)
@@ -255,8 +256,8 @@ def test_corners_are_those_of_the_april_tag_library(turn: int, store: Any) -> No
     )
     assert detection.homography.tolist() == target.homography.tolist()
 
-    library = pytest.importorskip('pupil_apriltags')
-    (theirs,) = library.Detector('tag36h11', quad_decimate=1.0).detect(image)
+    pytest.importorskip('pupil_apriltags')
+    (theirs,) = april_tag_detector().detect(image)
     assert (theirs.tag_id, theirs.hamming) == (5, 0)
     # (0, 0) is a corner of a pixel there, and corners are less exact.
     assert theirs.corners - 0.5 == pytest.approx(corners, abs=0.4)
