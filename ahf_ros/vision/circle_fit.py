@@ -1,21 +1,15 @@
-"""Sub-pixel frames of targets, from the edges of their circles in the original image.
-
-Frames are moved onto measured edges by robust weighted least squares. Edges of light that cross a
-target do not look like its own: the gray values beside them have another ratio, the profile is not
-a step, or it does not lie on the circles. They lose their weight. A slope of the light, which
-would move all edges to the same side, is taken from the profiles and corrected for.
-"""
+"""Sub-pixel frames of targets, from the edges of their circles in the original image."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from typing import Literal
 
 import numpy as np
 
 from ahf_ros.vision import frame
 from ahf_ros.vision.array_record import ArrayRecord
-from ahf_ros.vision.circles import Circles, dot_circles, edge_points
 from ahf_ros.vision.edge_errors import (
     NO_WEIGHT,
     EdgeWeights,
@@ -25,11 +19,11 @@ from ahf_ros.vision.edge_errors import (
     edge_covariance,
     smooth_slopes,
     unevenness,
-    weigh_edges,
 )
+from ahf_ros.vision.edge_fit import WEAK_PRIOR, EdgeFit, EdgeKind, Outlines, fit_edges
 from ahf_ros.vision.growth import growth_in_light
-from ahf_ros.vision.profiles import BLURS, USUAL_BLUR, Edges, measure_outlines
-from ahf_ros.vision.robust import geman_mcclure, geman_mcclure_gain, median, reweight, spread
+from ahf_ros.vision.profiles import BLURS, USUAL_BLUR, Edges
+from ahf_ros.vision.robust import geman_mcclure, geman_mcclure_gain, median
 
 ENOUGH = 0.5
 """Share of the expected edges from which a fit counts."""
@@ -38,10 +32,6 @@ SOFT = 1.0
 """Blur from which on an edge is soft, standard deviation in px."""
 
 _SOFT_ROUNDS = 4  # of measurements of soft edges
-_NOISE = 1.0  # of gray values, of 255; the fit scales it to what it finds
-_UNEVEN_LIGHT = 0.1  # error of edges that light causes, in the first round, px
-_MINIMUM_STEP = 1.0  # gray values, that the error of an edge is computed from
-_OUTLIER = 3.0  # times the usual distance from the circle that quarters the weight
 _MINIMUM_SPREAD = 0.5  # that counts as usual, in deviations that noise alone would cause
 _ROUNDS = 4  # of robust least squares
 _PLACED, _PLACED_RADII = 4 / 3, 0.08  # error of an edge in its place: in outliers, and dot radii
@@ -60,8 +50,7 @@ _SYSTEMATIC = 0.001  # standard deviation of what pixels and interpolation do to
 _PRIOR_SCALE = 0.003  # standard deviation of the printed proportions of circles and dot
 _PRIOR_LIT_SCALE = 0.02  # the same as uneven light shows them
 _PRIOR_PERSPECTIVE = 0.02  # of the projective part, in 1 a dot radius
-_PRIOR_SHIFT = 1.0  # of the shift of edges towards the dark side, px
-_WEAK_PRIOR = 1e-6  # of the other changes, so that they can always be solved for
+_PRIOR_SHIFT = 1.0  # of the growth of ink, px
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,6 +95,27 @@ NO_FITS = Fit(
 """An empty record."""
 
 
+def on_circles(
+    angles: np.ndarray, radii: np.ndarray, group: np.ndarray, polarity: np.ndarray
+) -> Outlines:
+    """Return points on the circles of k targets, at angles in the frame, rad, and radii, (m,).
+
+    Circles come in the order of their radii, in dot radii. The first point is on the outline of
+    the target or its dot, and has its polarity; group 0 is the dot.
+    """
+    normals = np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    spacing = 2 * np.pi * radii / (radii[:, None] == radii).sum(axis=1)
+    points = radii[:, None] * normals
+    return Outlines(points, normals, 1 / radii, spacing, radii, group, polarity)
+
+
+def dot_circles(polarity: np.ndarray, rays: int) -> Outlines:
+    """Return the edges of dots, `rays` points each; polarity (k,) is 1 for dark dots, else -1."""
+    angles = 2 * np.pi * np.arange(rays) / rays
+    of_points = np.repeat(np.asarray(polarity)[:, None], rays, axis=1)
+    return on_circles(angles, np.ones(rays), np.zeros(rays, int), of_points)
+
+
 def fit_dots(
     gray: np.ndarray,
     frames: np.ndarray,
@@ -133,7 +143,7 @@ def fit_dots(
 def fit_circles_of_any_blur(
     gray: np.ndarray,
     frames: np.ndarray,
-    circles: Circles,
+    circles: Outlines,
     *,
     reach: float | np.ndarray,
     projective: bool,
@@ -165,7 +175,7 @@ def fit_circles_of_any_blur(
 def fit_circles(
     gray: np.ndarray,
     frames: np.ndarray,
-    circles: Circles,
+    circles: Outlines,
     *,
     reach: float | np.ndarray,
     projective: bool,
@@ -180,22 +190,20 @@ def fit_circles(
     times in `gray`, float32 from 0 to 255. In a projective fit the circles have different radii,
     so that they determine the common centre; otherwise it is the centre of the ellipse. `blur`,
     shape (k,), is the standard deviation of the edges, px, as far as it is known. `uneven` light
-    moves edges as noise does, so that those in the light do not outweigh those in shadow by the
-    square of their contrast; the share is the dot's where less of the dot is in place.
+    moves edges as noise does; the share is the dot's where less of the dot is in place.
     """
     blur = np.full(len(frames), USUAL_BLUR) if blur is None else blur
-    window = _window(circles.angles.tobytes(), circles.radii.tobytes())
+    kind = _kind(circles, projective=projective, uneven=uneven)
     moved = frames
     for _ in range(rounds):
         frames = moved
-        edges = measure_outlines(gray, edge_points(frames, circles), blur, reach)
+        fit = fit_edges(gray, frames, circles, kind, blur, reach)
+        edges = fit.edges
         blur = np.clip(blur + median(edges.softness, edges.visible, 0.0), *BLURS)
-        solution = _solve(edges, circles, window, projective, uneven)
-        of_frame = solution.changes[:, :7]
-        np.clip(of_frame, -_MAXIMUM_CHANGE, _MAXIMUM_CHANGE, out=of_frame)
-        moved = frame.moved(frames, of_frame)
-    seen, errors = solution.own.seen, solution.errors
-    placed = seen & (solution.relative < _PLACED) & (np.abs(errors) < _PLACED_RADII)
+        of_frame = fit.unknowns[:, : 7 if projective else 5]
+        moved = frame.moved(frames, np.clip(of_frame, -_MAXIMUM_CHANGE, _MAXIMUM_CHANGE))
+    seen, errors = fit.own.seen, fit.errors
+    placed = seen & (fit.relative < _PLACED) & (np.abs(errors) < _PLACED_RADII)
     count = placed.sum(axis=1)
     shares = [_share(placed, edges.visible)]
     if uneven:
@@ -205,19 +213,19 @@ def fit_circles(
     squares = np.where(placed, errors * edges.scale, 0) ** 2
     covariance = np.full((len(frames), 2, 2), np.nan)
     if covariances:
-        covariance = _covariance(solution, edges, frames, circles, projective)
+        covariance = _covariance(fit, frames, circles, projective)
     affine = frame.local_affine(moved)
     return Fit(
         frames=moved,
         polarity=circles.polarity[:, 0],
-        contrast=solution.own.contrast,
+        contrast=fit.own.contrast,
         bright=median(np.maximum(edges.bright, 0), seen),
         share=np.min(shares, axis=0),
         deviation=np.sqrt(squares.sum(axis=1) / np.maximum(count, 1)),
         covariance=affine @ covariance @ affine.transpose(0, 2, 1) + _SYSTEMATIC**2 * np.eye(2),
         blur=blur,
-        edge_shift=-solution.changes[:, -1] if projective else np.zeros(len(frames)),
-        proportion=1 + solution.changes[:, 7] if projective else np.ones(len(frames)),
+        edge_shift=fit.unknowns[:, -1] if projective else np.zeros(len(frames)),
+        proportion=1 + fit.unknowns[:, 7] if projective else np.ones(len(frames)),
     )
 
 
@@ -226,60 +234,43 @@ def _share(placed: np.ndarray, visible: np.ndarray) -> np.ndarray:
     return np.asarray(placed.sum(axis=1) / np.maximum(visible.sum(axis=1), 1))
 
 
-@dataclass(frozen=True, slots=True)
-class _Solution:
-    """Changes of frames that bring circles onto edges, and what they were computed from."""
+def _kind(circles: Outlines, *, projective: bool, uneven: bool) -> EdgeKind:
+    """Return what moves the edges of circles.
 
-    own: EdgeWeights
-    light: LightSlope
-    model: _DisplacementModel
-    changes: np.ndarray
-    normal: np.ndarray
-    weights: np.ndarray
-    errors: np.ndarray
-    relative: np.ndarray
-    robust: np.ndarray
+    The unknowns are the changes in the order of `frame.displacement_basis`. In a projective fit
+    the scale of each group of circles, and the growth of ink, which the gamma of a camera causes,
+    too, follow.
+    """
+    x, y = circles.points.T
+    radii = np.hypot(x, y)
+    basis, prior = frame.displacement_basis(np.arctan2(y, x), radii), np.full(5, WEAK_PRIOR)
+    if projective:
+        groups = np.arange(1, circles.group.max(initial=0) + 1)
+        scales = np.where(circles.group[:, None] == groups, radii[:, None], 0)
+        basis = np.concatenate([basis, scales], axis=1)
+        of_scale = _PRIOR_LIT_SCALE if uneven else _PRIOR_SCALE
+        deviations = [_PRIOR_PERSPECTIVE] * 2 + [of_scale] * len(groups) + [_PRIOR_SHIFT]
+        prior = np.concatenate([prior, np.array(deviations) ** -2])
+    else:
+        basis = basis[:, :5]
+    window = _window(circles.points.tobytes(), circles.line.tobytes())
 
+    def smooth(edges: Edges, own: EdgeWeights) -> LightSlope:
+        common = common_slope(edges.slope, circles.polarity, own.weights)
+        prior = _LIGHT_PRIOR / edges.scale.mean(axis=1, keepdims=True)
+        # Where edges were sharpened, none of their slopes is the light's.
+        prior *= (1 + (common / _SHARPENED) ** 2) ** 2
+        return smooth_slopes(edges.slope - circles.polarity * common, own.weights, window, prior)
 
-def _solve(
-    edges: Edges, circles: Circles, window: np.ndarray, projective: bool, uneven: bool
-) -> _Solution:
-    """Return the changes of the frames that bring the circles onto the edges."""
-    own = weigh_edges(edges)
-    common = common_slope(edges.slope, circles.polarity, own.weights)
-    prior = _LIGHT_PRIOR / edges.scale.mean(axis=1, keepdims=True)
-    # Where edges were sharpened, none of their slopes is the light's.
-    prior *= (1 + (common / _SHARPENED) ** 2) ** 2
-    light = smooth_slopes(edges.slope - circles.polarity * common, own.weights, window, prior)
-    displacement = (edges.offset - edges.sensitivity * light.slope) / edges.scale
-    noise = _NOISE * np.sqrt(2 * np.sqrt(np.pi) * USUAL_BLUR)
-    of_noise = noise / np.maximum(edges.bright - edges.dark, _MINIMUM_STEP) / edges.scale
-    usual_noise = median(of_noise, own.seen)[:, None]
-    # Noise moves edges in shadow, light moves all of them.
-    deviation = np.hypot(of_noise, _UNEVEN_LIGHT / edges.scale) if uneven else of_noise
-
-    def solve(weights: np.ndarray) -> tuple[tuple[np.ndarray, ...], np.ndarray]:
-        nonlocal deviation
-        changes, normal = model.solve(displacement, weights / deviation**2)
-        errors = displacement - model.displacement(changes)
-        if uneven:
-            usual = spread(np.abs(errors), own.seen, 0.0)
-            deviation = np.hypot(of_noise, np.sqrt(np.maximum(usual**2 - usual_noise**2, 0)))
-        return (changes, normal, errors), np.abs(errors) / deviation
-
-    def scale(sizes: np.ndarray) -> np.ndarray:
-        return _OUTLIER * spread(sizes, own.seen, _MINIMUM_SPREAD)
-
-    model = _DisplacementModel(circles, edges.scale, projective, uneven)
-    (changes, normal, errors), relative, robust = reweight(solve, own.weights, scale, _ROUNDS)
-    weights, robust = (of / deviation**2 for of in (own.weights, robust))
-    return _Solution(own, light, model, changes, normal, weights, errors, relative, robust)
+    relative_to: Literal['noise', 'light'] = 'light' if uneven else 'noise'
+    return EdgeKind(basis, prior, smooth, relative_to, _MINIMUM_SPREAD, _ROUNDS)
 
 
 def _covariance(
-    of: _Solution, edges: Edges, frames: np.ndarray, circles: Circles, projective: bool
+    of: EdgeFit, frames: np.ndarray, circles: Outlines, projective: bool
 ) -> np.ndarray:
     """Return the covariances of the centres, shape (k, 2, 2), squared dot radii."""
+    edges = of.edges
     # What an error changes is not its weight times the error, but the derivative of that.
     gain = geman_mcclure_gain(of.weights, of.relative).sum(axis=1)
     gain = np.maximum(gain / np.maximum(of.robust.sum(axis=1), NO_WEIGHT), _MINIMUM_GAIN)
@@ -287,7 +278,7 @@ def _covariance(
     parts = influence * of.errors[:, None]
     parts -= of.light.influence(influence * (edges.sensitivity / edges.scale)[:, None])
     used = geman_mcclure(of.own.weights, of.relative)
-    common = common_errors(used * of.errors * edges.scale, circles.radii)
+    common = common_errors(used * of.errors * edges.scale, circles.line)
     covariance = edge_covariance(parts, used, edges.spacing, of.normal.shape[1], common)
     if projective:
         dot = circles.group == 0
@@ -296,74 +287,16 @@ def _covariance(
         variance = _OF_LIGHT * (uneven + _EVEN) * short
     else:
         variance = 1 + np.minimum((unevenness(of.light.errors, used) / _UNEVEN) ** 2, 1)
-    covariance *= variance[:, None, None]
-    return covariance
-
-
-class _DisplacementModel:
-    """How changes of k frames, and of what else is unknown, move their edges outwards.
-
-    The unknowns are the changes in the order of `frame.displacement_basis`. In a projective model
-    the scale of each group of circles, and the shift of all edges towards the dark side which the
-    gamma of a camera causes, follow.
-    """
-
-    def __init__(
-        self, circles: Circles, scale: np.ndarray, projective: bool, uneven: bool
-    ) -> None:
-        shared = frame.displacement_basis(circles.angles, circles.radii)
-        own = np.zeros((len(scale), len(shared), 0))
-        prior: np.ndarray = np.full(5, _WEAK_PRIOR)
-        if projective:
-            groups = np.arange(1, circles.group.max(initial=0) + 1)
-            scales = np.where(circles.group[:, None] == groups, circles.radii[:, None], 0)
-            shared = np.concatenate([shared, scales], axis=1)
-            own = (-circles.polarity / scale)[..., None]
-            of_scale = _PRIOR_LIT_SCALE if uneven else _PRIOR_SCALE
-            deviations = [_PRIOR_PERSPECTIVE] * 2 + [of_scale] * len(groups) + [_PRIOR_SHIFT]
-            prior = np.concatenate([prior, np.array(deviations) ** -2])
-        else:
-            shared = shared[:, :5]
-        self._shared, self._own, self._prior = shared, own, np.diag(prior)
-        self._products = (shared[:, :, None] * shared[:, None]).reshape(len(shared), -1)
-
-    def solve(self, values: np.ndarray, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the unknowns, shape (k, n), and the normal matrices of weighted least squares."""
-        count, known = len(values), self._shared.shape[1]
-        weighted = weights[..., None] * self._own
-        mixed = weighted.transpose(0, 2, 1) @ self._shared
-        normal = np.empty((count, *self._prior.shape))
-        normal[:, :known, :known] = (weights @ self._products).reshape(count, known, known)
-        normal[:, known:, :known] = mixed
-        normal[:, :known, known:] = mixed.transpose(0, 2, 1)
-        normal[:, known:, known:] = weighted.transpose(0, 2, 1) @ self._own
-        normal += self._prior
-        right = np.concatenate(
-            [(weights * values) @ self._shared, (weighted * values[..., None]).sum(axis=1)], axis=1
-        )
-        return np.linalg.solve(normal, right[..., None])[..., 0], normal
-
-    def displacement(self, unknowns: np.ndarray) -> np.ndarray:
-        """Return how far unknowns, shape (k, n), move the edges, dot radii, shape (k, m)."""
-        known = self._shared.shape[1]
-        own = (self._own @ unknowns[:, known:, None])[..., 0]
-        return unknowns[:, :known] @ self._shared.T + own
-
-    def influence(self, normal: np.ndarray) -> np.ndarray:
-        """Return what a weighted displacement does to the translation, shape (k, 2, m)."""
-        known = self._shared.shape[1]
-        inverse = np.linalg.inv(normal)[:, :2]
-        own = inverse[:, :, known:] @ self._own.transpose(0, 2, 1)
-        return inverse[:, :, :known] @ self._shared.T + own
+    return np.asarray(covariance * variance[:, None, None])
 
 
 @lru_cache(maxsize=8)  # up to two megabytes each; the same circles are fitted again and again
-def _window(angles: bytes, radii: bytes) -> np.ndarray:
+def _window(points: bytes, lines: bytes) -> np.ndarray:
     """Return the weights of the light at other points of the same circle, (m, m), from float64."""
-    around, lengths = np.frombuffer(angles), np.frombuffer(radii)
-    points = lengths[:, None] * np.stack([np.cos(around), np.sin(around)], axis=1)
-    squares = 2 * (lengths**2 - points @ points.T)
-    squares[lengths[:, None] != lengths] = np.inf
+    places, line = np.frombuffer(points).reshape(-1, 2), np.frombuffer(lines)
+    lengths = (places**2).sum(axis=1)
+    squares = lengths[:, None] + lengths - 2 * places @ places.T
+    squares[line[:, None] != line] = np.inf
     window = np.exp(-0.5 * squares / _LIGHT_REACH**2)
     window = (window / window.sum(axis=0)).astype(np.float32)
     window.flags.writeable = False

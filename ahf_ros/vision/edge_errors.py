@@ -59,7 +59,7 @@ def weigh_edges(edges: Edges) -> EdgeWeights:
 
 @dataclass(frozen=True, slots=True)
 class LightSlope:
-    """The smoothed slope of the light at n points of k outlines, shape (k, n)."""
+    """The smoothed slope of the light at m points on the outlines of k targets, shape (k, m)."""
 
     slope: np.ndarray  # outwards, as a share of the light, 1/px
     errors: np.ndarray  # of the slopes of the single profiles, 1/px
@@ -99,12 +99,15 @@ def smooth_slopes(
     prior: np.ndarray | float,
     rounds: int = 2,
 ) -> LightSlope:
-    """Smooth the slopes of profiles, with weights, both of shape (k, n), along outlines.
+    """Smooth the slopes of profiles, with weights, both of shape (k, m), along outlines.
 
-    `window`, shape (n, n), says how much each profile, by row, tells of the light at each. The
-    prior, a number or of shape (k, 1), is the weight that tells as much as the belief that there
-    is no slope. In each round but the first, outliers among the profiles have lost weight.
+    `window`, shape (n, n), says how much each of the n profiles of an outline, by row, tells of
+    the light at each. The prior, a number or of shape (k, 1), is the weight that tells as much as
+    the belief that there is no slope. In each round but the first, outliers among the profiles
+    have lost weight.
     """
+    shape = slopes.shape
+    slopes, weights = (of.reshape(-1, len(window)) for of in (slopes, weights))
     seen = weights > 0
     middle = median(slopes, seen)[:, None]
     usual = np.maximum(median(np.abs(slopes - middle), seen), _MINIMUM_USUAL)[:, None]
@@ -114,7 +117,26 @@ def smooth_slopes(
         smooth = (robust * slopes).astype(window.dtype) @ window / totals
         errors = slopes - smooth
         used, robust = robust, cauchy(weights, errors / (_OUTLIER * usual))
-    return LightSlope(smooth, errors, used, totals, window)
+    smooth, errors = smooth.reshape(shape), errors.reshape(shape)
+    return LightSlope(smooth, errors, used.reshape(shape), totals.reshape(shape), window)
+
+
+def grouped_covariance(normals: np.ndarray, sums: np.ndarray) -> np.ndarray:
+    """Return the covariances of the first two unknowns, from errors that come in groups.
+
+    Normal matrices have the shape (k, m, m). What the weighted errors of each group add to the
+    right sides has the shape (k, m, n), 0 for a group that is not seen. Within a group, errors
+    may have anything in common [1]_.
+
+    References
+    ----------
+    .. [1] Liang & Zeger, Longitudinal data analysis using generalized linear models, Biometrika
+       73(1), 1986, 13-22.
+    """
+    some = np.linalg.inv(normals)[:, :2] @ sums
+    count = (sums != 0).any(axis=1).sum(axis=1)
+    freedom = (count / np.maximum(count - normals.shape[1], 1)) ** 2
+    return np.asarray(freedom[:, None, None] * (some @ np.swapaxes(some, 1, 2)))
 
 
 def common_errors(errors: np.ndarray, outline: np.ndarray) -> np.ndarray:

@@ -15,7 +15,14 @@ from __future__ import annotations
 
 import numpy as np
 
+SYSTEMATIC = 0.003
+"""Standard deviation of the effects of lens distortion and pixels on a centre, px."""
+
 _CORNERS = 32  # of the polygon of an outline
+
+# The changes of `changed` that circles show: none of them turns the plane.
+_OF_CIRCLES = np.eye(8)[[0, 1, 2, 2, 3, 6, 7]]
+_OF_CIRCLES[[2, 3, 4], [5, 5, 4]] = 1, -1, 1
 
 
 def affine_frames(
@@ -84,20 +91,39 @@ def displacement_basis(angles: np.ndarray, radii: np.ndarray) -> np.ndarray:
     return np.stack([cosine, sine, *strain, *projective], axis=-1)
 
 
+def outline_basis(points: np.ndarray, normals: np.ndarray) -> np.ndarray:
+    """Return how far each change of a frame moves points of outlines along their normals.
+
+    The columns, shape (m, 8), are those of `changed`; points and normals have the shape (m, 2).
+    """
+    (x, y), (across, down) = points.T, normals.T
+    outwards = -(x * across + y * down)
+    linear = [across * x, across * y, down * x, down * y]
+    return np.stack([across, down, *linear, outwards * x, outwards * y], axis=-1)
+
+
+def changed(frames: np.ndarray, changes: np.ndarray) -> np.ndarray:
+    """Return frames after small changes, (k, 8), scaled so that their last element is one.
+
+    The plane is changed before it is projected, by the translation (c, f) in x and y, the linear
+    part a, b, d, e and the projective part g, h, in this order:
+
+        (x, y) -> (x, y) + (a x + b y + c, d x + e y + f) - (g x + h y) (x, y).
+    """
+    change = np.tile(np.eye(3), (len(frames), 1, 1))
+    change[:, :2, 2] = changes[:, :2]
+    change[:, :2, :2] += changes[:, 2:6].reshape(-1, 2, 2)
+    change[:, 2, :2] = changes[:, 6:]
+    product = frames @ change
+    return product / product[:, 2:, 2:]
+
+
 def moved(frames: np.ndarray, changes: np.ndarray) -> np.ndarray:
-    """Return frames after small changes, scaled so that their last element is one.
+    """Return frames of circles after small changes, as `changed` does.
 
     Changes are those of `displacement_basis`, all seven or all but the projective ones.
     """
-    change = np.zeros_like(frames)
-    change[:, 0, 0] = 1 + changes[:, 2] + changes[:, 3]
-    change[:, 1, 1] = 1 + changes[:, 2] - changes[:, 3]
-    change[:, 0, 1] = change[:, 1, 0] = changes[:, 4]
-    change[:, :2, 2] = changes[:, :2]
-    change[:, 2, : changes.shape[1] - 5] = changes[:, 5:]
-    change[:, 2, 2] = 1.0
-    product = frames @ change
-    return product / product[:, 2:, 2:]
+    return changed(frames, changes @ _OF_CIRCLES[: changes.shape[1]])
 
 
 def translated(frames: np.ndarray, x: float, y: float) -> np.ndarray:
@@ -158,6 +184,15 @@ def mean_radii(frames: np.ndarray) -> np.ndarray:
 def local_affine(frames: np.ndarray) -> np.ndarray:
     """Return the derivatives of frames' maps at the centre, shape (..., 2, 2), px a radius."""
     return frames[..., :2, :2] - frames[..., :2, 2:] * frames[..., 2:, :2]
+
+
+def centre_covariance(frames: np.ndarray, covariance: np.ndarray) -> np.ndarray:
+    """Return the covariances of the images of centres, (k, 2, 2), px^2, from those in the plane.
+
+    Lens distortion and pixels add their own.
+    """
+    affine = local_affine(frames)
+    return affine @ covariance @ affine.transpose(0, 2, 1) + SYSTEMATIC**2 * np.eye(2)
 
 
 def nearest(frames: np.ndarray, others: np.ndarray, count: int) -> np.ndarray:

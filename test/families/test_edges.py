@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
-from ahf_ros.families.square.edges import fit_edges
+from ahf_ros.families.square.edges import fit_markers
 from ahf_ros.families.square.frames import SQUARE, Places, centres
 from ahf_ros.vision.image import GAMMA
 
@@ -46,7 +46,7 @@ def drawn(light: np.ndarray | float = 200.0, grown: float = 0.0) -> np.ndarray:
 
 
 def fitted_to(gray: np.ndarray, corners: np.ndarray = CORNERS + NEAR) -> Places:
-    return fit_edges(gray, corners[None], INK[None])
+    return fit_markers(gray, corners[None], INK[None])
 
 
 def centre_error(fitted: Places) -> float:
@@ -94,11 +94,11 @@ def test_paper_that_covers_a_side_is_not_taken_for_it(side, cut):
 
 def test_several_at_once_are_those_one_by_one():
     starts = np.stack([CORNERS + NEAR, CORNERS - NEAR])
-    both = fit_edges(drawn(), starts, np.stack([INK, INK]))
+    both = fit_markers(drawn(), starts, np.stack([INK, INK]))
     for start, corners in zip(starts, both.corners, strict=True):
         # BLAS may round batches of another size otherwise.
         assert fitted_to(drawn(), start).corners[0] == pytest.approx(corners, abs=1e-6)
-    assert len(fit_edges(drawn(), np.zeros((0, 4, 2)), INK[None][:0]).corners) == 0
+    assert len(fit_markers(drawn(), np.zeros((0, 4, 2)), INK[None][:0]).corners) == 0
 
 
 @pytest.mark.parametrize('angle', [20, 45, 70, 110])

@@ -19,8 +19,9 @@ def test_a_marked_sector_has_an_inner_and_an_outer_edge(start, polarity):
         np.array([0b000000000100]), np.array([start]), np.array([polarity]), 10, CODE
     )
     for radius, expected in ((CODE.band_inner, -polarity), (CODE.band_outer, polarity)):
-        there = (circles.radii == radius) & (circles.polarity[0] != 0)
-        turn = (-circles.angles[there] - start) / (2 * np.pi / 12) % 12
+        there = (circles.line == radius) & (circles.polarity[0] != 0)
+        x, y = circles.points[there].T
+        turn = (np.arctan2(-y, x) - start) / (2 * np.pi / 12) % 12
         assert len(turn) == 8  # of ten: next to its ends an arc is rounded off
         assert turn.min() > 2 and turn.max() < 3
         assert turn.mean() == pytest.approx(2.5, abs=0.06)
@@ -30,5 +31,5 @@ def test_a_marked_sector_has_an_inner_and_an_outer_edge(start, polarity):
 def test_the_number_of_edges_is_that_of_the_marked_sectors():
     words, polarity = np.array([0b000001000111, 0b111111111110]), np.array([1, 1])
     circles = target_circles(words, np.zeros(2), polarity, 10, CODE)
-    marked = (circles.polarity[:, circles.radii > 1] != 0).sum(axis=1)
+    marked = (circles.polarity[:, circles.line > 1] != 0).sum(axis=1)
     assert marked.tolist() == [4 * 2 * 8, 11 * 2 * 8]

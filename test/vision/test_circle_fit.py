@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from ahf_ros.vision import frame
-from ahf_ros.vision.circle_fit import Fit, fit_circles, fit_dots
-from ahf_ros.vision.circles import Circles
+from ahf_ros.vision.circle_fit import Fit, fit_circles, fit_dots, on_circles
 
 BLUR = 0.7
 DARK, BRIGHT = 40.0, 200.0
@@ -83,7 +82,7 @@ def test_circles_of_several_groups_give_the_image_of_the_centre():
     rays = 96
     angles = np.tile(2 * np.pi * np.arange(rays) / rays, len(designed))
     polarity = np.repeat([1, -1, 1, -1], rays)[None]
-    circles = Circles(angles, np.repeat(designed, rays), np.repeat(range(4), rays), polarity)
+    circles = on_circles(angles, np.repeat(designed, rays), np.repeat(range(4), rays), polarity)
     joint = fit_circles(image, by_dot.frames, circles, reach=0.3, projective=True)
     joint = fit_circles(image, joint.frames, circles, reach=0.3, projective=True)
     errors = [np.hypot(*(centre(fit) - (60.3, 59.8))) for fit in (by_dot, joint)]
@@ -157,7 +156,7 @@ def test_edges_of_the_band_alone_do_not_make_a_share():
     radii = (0.8, 2.0, 3.0)
     count = 48
     angles = 2 * np.pi * np.arange(count) / count
-    circles = Circles(
+    circles = on_circles(
         angles=np.tile(angles, 3),
         radii=np.repeat([1.0, 2.0, 3.0], count),
         polarity=np.repeat([[1, -1, 1]], count, axis=1),

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 from ahf_ros.vision import frame
-from ahf_ros.vision.circles import Circles, dot_circles, edge_points
+from ahf_ros.vision.circle_fit import dot_circles, on_circles
+from ahf_ros.vision.edge_fit import edge_points
 
 OBLIQUE = np.array([[[20.0, 3.0, 100.5], [-2.0, 12.0, 80.25], [0.02, -0.01, 1.0]]])
 ANGLES = np.linspace(0, 2 * np.pi, 24, endpoint=False)
@@ -17,21 +16,21 @@ ANGLES = np.linspace(0, 2 * np.pi, 24, endpoint=False)
 def test_a_dark_dot_is_brighter_outside():
     circles = dot_circles(np.array([1, -1]), 8)
     assert circles.polarity.tolist() == [[1] * 8, [-1] * 8]
-    assert circles.radii.tolist() == [1.0] * 8
+    assert circles.line.tolist() == [1.0] * 8
     assert circles.group.tolist() == [0] * 8
     assert circles.spacing == pytest.approx(np.full(8, np.pi / 4))
 
 
 def test_spacing_is_the_distance_to_the_next_point_of_a_circle():
     radii = np.repeat([1.0, 3.0], [16, 120])
-    circles = Circles(np.zeros(136), radii, (radii > 1).astype(int), np.ones((1, 136), int))
+    circles = on_circles(np.zeros(136), radii, (radii > 1).astype(int), np.ones((1, 136), int))
     assert circles.spacing[0] == pytest.approx(2 * np.pi / 16)
     assert circles.spacing[-1] == pytest.approx(2 * np.pi * 3 / 120)
 
 
 def test_geometry_of_a_circle():
     frames = frame.affine_frames([50], [40], [8], [8], [0])
-    circles = replace(dot_circles([1], 24), radii=np.full(24, 2.5))
+    circles = on_circles(ANGLES, np.full(24, 2.5), np.zeros(24, int), np.ones((1, 24), int))
     geometry = edge_points(frames, circles)
     normals = np.stack([np.cos(ANGLES), np.sin(ANGLES)], axis=1)
     assert geometry.normals[0] == pytest.approx(normals)

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from ahf_ros.vision import frame
-from ahf_ros.vision.circles import Circles, dot_circles, edge_points
+from ahf_ros.vision.circle_fit import dot_circles, on_circles
+from ahf_ros.vision.edge_fit import edge_points
 from ahf_ros.vision.profiles import Edges, measure_outlines
 
 WIDE = 1000.0
@@ -29,7 +30,7 @@ def step_image(place: float, blur: float, slope: float = 0.0) -> np.ndarray:
 def measured(image: np.ndarray, blur: float, polarity: int = 1) -> Edges:
     """Measure the one point of a wide circle that is vertical at MIDDLE."""
     frames = frame.affine_frames([MIDDLE[0] - WIDE], [MIDDLE[1]], [WIDE], [WIDE], [0.0])
-    point = Circles(np.zeros(1), np.ones(1), np.zeros(1, int), np.full((1, 1), polarity))
+    point = on_circles(np.zeros(1), np.ones(1), np.zeros(1, int), np.full((1, 1), polarity))
     outline = edge_points(frames, point)
     return measure_outlines(image, outline, np.array([blur]), reach=2.5 / WIDE)
 

@@ -22,8 +22,7 @@ from ahf_ros.families.contract import DetectorSettings
 from ahf_ros.families.dots.reading import Readings, dot_points, expecting, read_rings
 from ahf_ros.prints.dots import DotFamily
 from ahf_ros.vision.array_record import ArrayRecord
-from ahf_ros.vision.circle_fit import Fit, fit_circles_of_any_blur
-from ahf_ros.vision.circles import Circles
+from ahf_ros.vision.circle_fit import Fit, fit_circles_of_any_blur, on_circles
 from ahf_ros.vision.dots import Dots
 from ahf_ros.vision.ellipse_targets import ellipse_fields
 from ahf_ros.vision.frame import ellipse_axes, mean_radii
@@ -59,7 +58,7 @@ def fit_targets(
     angles = 2 * np.pi * np.arange(_RAYS) / _RAYS
     radii = np.repeat([1.0, code.ground_radius, code.border_radius], _RAYS)
     group, signs = np.repeat([0, 1, 1], _RAYS), np.repeat([1, -1, 1], _RAYS)
-    circles = Circles(np.tile(angles, 3), radii, group, polarity[:, None] * signs)
+    circles = on_circles(np.tile(angles, 3), radii, group, polarity[:, None] * signs)
     reach = np.maximum(_REACH, _MINIMUM_REACH / mean_radii(frames))[:, None]
     return fit_circles_of_any_blur(gray, frames, circles, reach=reach, projective=True, rounds=3)
 

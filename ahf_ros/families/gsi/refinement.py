@@ -11,8 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ahf_ros.vision.black import black_lift
-from ahf_ros.vision.circle_fit import ENOUGH, fit_circles_of_any_blur
-from ahf_ros.vision.circles import dot_circles
+from ahf_ros.vision.circle_fit import ENOUGH, dot_circles, fit_circles_of_any_blur
 from ahf_ros.vision.dots import Dots
 from ahf_ros.vision.frame import ellipse_axes, mean_radii, project
 from ahf_ros.vision.homography import fit_homographies, local_frames

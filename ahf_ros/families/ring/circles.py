@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from ahf_ros.prints.ring import Family
-from ahf_ros.vision.circles import Circles, dot_circles
+from ahf_ros.vision.circle_fit import on_circles
+from ahf_ros.vision.edge_fit import Outlines
 
 REACH = 0.45
 """Distance from an expected edge to look for it, dot radii: less than half a gap.
@@ -31,20 +32,20 @@ def target_circles(
     polarity: np.ndarray,
     samples: int,
     family: Family,
-) -> Circles:
+) -> Outlines:
     """Return the edges of k targets, with some points a sector on each edge of the band.
 
     See `decoding.Words` for words and starts. The polarity is 1 for a dark target, else -1.
     """
-    dot = dot_circles(polarity, RAYS)
     count = family.bits * samples
     angles = 2 * np.pi * (np.arange(count) + 0.5) / count
     sector, depth = np.divmod((angles - starts[:, None]) * family.bits / (2 * np.pi), 1)
     bits = words[:, None] >> sector.astype(np.int64) % family.bits & 1
     marked = np.where(np.abs(depth - 0.5) < _INNER_PART, bits, 0) * polarity[:, None]
-    return Circles(
-        np.concatenate([dot.angles, -angles, -angles]),
-        np.concatenate([dot.radii, np.repeat([family.band_inner, family.band_outer], count)]),
-        np.concatenate([dot.group, np.ones(2 * count, int)]),
-        np.concatenate([dot.polarity, -marked, marked], axis=1),
+    counts = [RAYS, count, count]
+    return on_circles(
+        np.concatenate([2 * np.pi * np.arange(RAYS) / RAYS, -angles, -angles]),
+        np.repeat([1.0, family.band_inner, family.band_outer], counts),
+        np.repeat([0, 1, 1], counts),
+        np.concatenate([np.repeat(polarity[:, None], RAYS, axis=1), -marked, marked], axis=1),
     )

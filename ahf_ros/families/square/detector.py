@@ -17,7 +17,7 @@ from ahf_ros.base.blas import one_blas_thread
 from ahf_ros.base.target import SquareMarker, Target, sorted_targets
 from ahf_ros.families.claims import Rivals, owners
 from ahf_ros.families.contract import ExpectingDetector, moved_targets
-from ahf_ros.families.square.edges import fit_edges
+from ahf_ros.families.square.edges import fit_markers
 from ahf_ros.families.square.frames import Places, centres, side_lengths
 from ahf_ros.families.square.margins import decision_margins
 from ahf_ros.families.square.prints import lay_outlines, lay_prints
@@ -128,7 +128,7 @@ class SquareDetector(ExpectingDetector):
             alike = [it for it, of in zip(markers, prints, strict=True) if len(of) == cells]
             corners = np.array([it.corners for it in alike])
             ink = np.array([of for of in prints if len(of) == cells])
-            fit = fit_edges(gray, _from_halves(gray, corners, ink), ink)
+            fit = fit_markers(gray, _from_halves(gray, corners, ink), ink)
             fit = lay_prints(gray, fit, ink)
             places = _places(fit.corners, fit.covariance, fit.edge_shift)
             shown = decision_margins(gray, fit.corners, ink)
@@ -286,7 +286,7 @@ def _from_halves(gray: np.ndarray, corners: np.ndarray, ink: np.ndarray) -> np.n
     halves = halved(gray, levels)
     for level in range(levels, 0, -1):
         which = np.flatnonzero(sides > _LARGE * 2 ** (level - 1))
-        fit = fit_edges(halves[level], reduced(corners[which], level), ink[which])
+        fit = fit_markers(halves[level], reduced(corners[which], level), ink[which])
         good = fit.share > 0
         corners[which[good]] = _enlarged(fit.corners[good], level)
     return corners

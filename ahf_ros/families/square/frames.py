@@ -1,11 +1,4 @@
-"""Frames of square markers: homographies from the square about the origin with sides of 1.
-
-A small change of a frame is one of the square before it is projected,
-
-    (x, y) -> (x, y) + (a x + b y + c, d x + e y + f) - (g x + h y) (x, y),
-
-so that what moves an edge is linear in eight unknowns, in sides of the square.
-"""
+"""Frames of square markers: homographies from the square about the origin with sides of 1."""
 
 from __future__ import annotations
 
@@ -15,16 +8,9 @@ import cv2
 import numpy as np
 
 from ahf_ros.vision.array_record import ArrayRecord
-from ahf_ros.vision.frame import local_affine
 
 SQUARE = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])
 """Corners of the square about the origin with sides of 1."""
-
-SYSTEMATIC = 0.003
-"""Standard deviation of the effects of lens distortion and pixels on a centre, px."""
-
-PLACE = 8
-"""Unknowns of a frame."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,38 +57,6 @@ def square_frames(corners: np.ndarray) -> np.ndarray:
     square = SQUARE.astype(np.float32)
     found = [cv2.getPerspectiveTransform(square, of) for of in corners.astype(np.float32)]
     return np.array(found).reshape(-1, 3, 3)
-
-
-def changed(frames: np.ndarray, changes: np.ndarray) -> np.ndarray:
-    """Return frames after changes, shape (k, 8)."""
-    moved = np.tile(np.eye(3), (len(frames), 1, 1))
-    moved.reshape(-1, 9)[:, :PLACE] += changes
-    return frames @ moved
-
-
-def derivatives(frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return how distances and places change at the centres, shapes (k, 2) and (k, 2, 2).
-
-    Distances from the camera change in shares of their own, in a side of the square; places in px.
-    """
-    scaled = frames / frames[:, 2:, 2:]
-    return scaled[:, 2, :2], local_affine(scaled)
-
-
-def centre_covariance(frames: np.ndarray, normals: np.ndarray, sums: np.ndarray) -> np.ndarray:
-    """Return the covariances of centres, px^2, from least squares whose errors come in groups.
-
-    Normal matrices, shape (k, m, m), have the changes of frames first. What the weighted errors of
-    each group add to the right sides has the shape (k, m, n), 0 for a group that is not seen.
-    """
-    inverse = np.linalg.inv(normals)
-    count = (sums != 0).any(axis=1).sum(axis=1)
-    freedom = (count / np.maximum(count - normals.shape[1], 1)) ** 2
-    of_all = inverse @ (sums @ np.swapaxes(sums, 1, 2)) @ inverse
-    centre = of_all[:, [[2, 2], [5, 5]], [[2, 5], [2, 5]]]
-    _, along = derivatives(frames)
-    covariance = along @ centre @ np.swapaxes(along, 1, 2)
-    return freedom[:, None, None] * covariance + SYSTEMATIC**2 * np.eye(2)
 
 
 def meet(

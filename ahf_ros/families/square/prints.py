@@ -7,15 +7,13 @@ takes part, so that cells of a pixel and a half suffice. Blurred cells are produ
 distributions, which makes all derivatives exact but that of the growth of ink, which is
 proportional to the gradient of the print.
 
-What the residuals of a cell sum up to says how well a marker is determined [2]_: patterns of light
+What the residuals of a cell sum up to says how well a marker is determined, as patterns of light
 leave residuals that stretch over cells.
 
 References
 ----------
 .. [1] Baker & Matthews, Lucas-Kanade 20 years on: a unifying framework, Int. J. Comput. Vis.
    56(3), 2004, 221-255, section 3.
-.. [2] Liang & Zeger, Longitudinal data analysis using generalized linear models, Biometrika 73(1),
-   1986, 13-22.
 """
 
 from __future__ import annotations
@@ -24,16 +22,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ahf_ros.families.square.frames import (
-    PLACE,
-    SQUARE,
-    Places,
-    centre_covariance,
-    changed,
-    side_lengths,
-    square_frames,
-)
-from ahf_ros.vision.frame import project
+from ahf_ros.families.square.frames import SQUARE, Places, side_lengths, square_frames
+from ahf_ros.vision.edge_errors import grouped_covariance
+from ahf_ros.vision.frame import centre_covariance, changed, project
 from ahf_ros.vision.growth import growth_in_light
 from ahf_ros.vision.normal import normal_integral
 from ahf_ros.vision.profiles import USUAL_BLUR
@@ -55,8 +46,9 @@ _USUAL_RESIDUAL = 0.3  # minimum, gray values
 _AGREES = 0.25  # residual of a sample that looks like the print, in all the contrast there is
 _ENOUGH, _HOPELESS = 0.9, 0.7  # share of such samples; where it is less, light is uneven
 _RIDGE = 1e-6  # of diagonals of normal matrices, so that they can be inverted
+_PLACE = 8  # unknowns of a frame
 _LEVELS = 7  # unknowns of the levels of paper and ink, and of growth
-_UNKNOWNS = PLACE + 1 + _LEVELS
+_UNKNOWNS = _PLACE + 1 + _LEVELS
 _TOGETHER = 50_000  # samples at a time, which bounds the memory
 
 
@@ -172,10 +164,10 @@ def _laid(
         normal, scores = _normal_equations(full, weights, residual)
         change = -_solved(normal, scores)
         limit = _LARGEST_STEP / cells
-        frames[active] = changed(frames[active], np.clip(change[:, :PLACE], -limit, limit))
-        softer = blur[active] + change[:, PLACE]
+        frames[active] = changed(frames[active], np.clip(change[:, :_PLACE], -limit, limit))
+        softer = blur[active] + change[:, _PLACE]
         blur[active] = np.clip(softer, _SHARPEST / size[active], _SOFTEST / cells)
-        levels[active] += change[:, PLACE + 1 :]
+        levels[active] += change[:, _PLACE + 1 :]
         there = project(frames[active], SQUARE)
         last = np.linalg.norm(there - laid[active], axis=2).max(axis=1)
         laid[active] = there
@@ -193,9 +185,8 @@ def _laid(
     near = np.linalg.norm(laid - corners, axis=2).max(axis=1) < np.maximum(size / cells, _NEAR)
     contrast = (levels[:, 0] + levels[:, 3]) / np.maximum(levels[:, 0], 1)
     shift = growth_in_light(levels[:, 6] / levels[:, 3] * size, blur * size, contrast)
-    return Places(
-        laid, np.where(near, share, 0.0), centre_covariance(frames, normals, sums), shift
-    )
+    covariance = centre_covariance(frames, grouped_covariance(normals, sums))
+    return Places(laid, np.where(near, share, 0.0), covariance, shift)
 
 
 def _of_levels(ink: np.ndarray, plane: np.ndarray, whole: bool) -> np.ndarray:
@@ -211,8 +202,8 @@ def _of_place(ink: np.ndarray, plane: np.ndarray, step: np.ndarray) -> np.ndarra
     """Return the derivatives of residuals by a homography and the blur, (k, 9, n)."""
     x, y, soft = ink[1:] * step
     _, across, down = plane
-    moved = (x * across, x * down, x, y * across, y * down, y)
-    bent = moved[0] + moved[4]
+    moved = (x, y, x * across, x * down, y * across, y * down)
+    bent = moved[2] + moved[5]
     return np.stack([*moved, -bent * across, -bent * down, -soft], axis=1)
 
 

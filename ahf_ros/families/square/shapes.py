@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ahf_ros.families.square.frames import derivatives
+from ahf_ros.vision.frame import local_affine
 from ahf_ros.vision.normal import normal_integral
 
 _CORNER_ERROR = 1.0  # of the lengths of opposite sides, as corners are known to half a pixel, px
@@ -23,10 +23,9 @@ def parallel_odds(frames: np.ndarray, width: int) -> np.ndarray:
     Sides of a square converge by its size over its distance, which is that of its image over the
     focal length; the image is so wide, px.
     """
-    converging, along = derivatives(frames)
-    largest, smallest = np.linalg.svd(along, compute_uv=False).T
+    largest, smallest = np.linalg.svd(local_affine(frames), compute_uv=False).T
     usual = _CORNER_ERROR / smallest + largest / (_FOCAL_LENGTH * width)
-    relative = np.linalg.norm(converging, axis=1) / usual
+    relative = np.linalg.norm(frames[:, 2, :2], axis=1) / usual
     return -np.minimum(relative**2 / 2, _CONVERGING)
 
 
