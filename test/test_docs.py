@@ -25,17 +25,17 @@ def name(page: Path) -> str:
 
 
 @pytest.mark.parametrize('page', SCRIPT['PAGES'])
-def test_the_tables_are_current(page: str):
+def test_the_tables_are_current(page: str) -> None:
     text = (ROOT / page).read_text()
     assert SCRIPT['with_tables'](page, text) == text, 'run scripts/write_docs.py'
 
 
-def test_there_are_examples():
+def test_there_are_examples() -> None:
     assert {name(page) for page in WITH_EXAMPLES} >= {'README.md', 'docs/library.md'}
 
 
 @pytest.mark.parametrize('page', WITH_EXAMPLES, ids=name)
-def test_the_examples_do_what_they_say(page: Path, monkeypatch: pytest.MonkeyPatch):
+def test_the_examples_do_what_they_say(page: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(ROOT)
     results = doctest.testfile(str(page), module_relative=False)
     assert results.attempted >= 4
@@ -43,7 +43,7 @@ def test_the_examples_do_what_they_say(page: Path, monkeypatch: pytest.MonkeyPat
 
 
 @pytest.mark.parametrize('page', PAGES, ids=name)
-def test_links_lead_somewhere(page: Path):
+def test_links_lead_somewhere(page: Path) -> None:
     links = re.findall(r'\]\(([^)]+)', page.read_text())
     for link in links:
         file, _, heading = link.partition('#')
@@ -61,20 +61,20 @@ def headings(page: Path) -> set[str]:
 
 
 @pytest.mark.parametrize('page', PAGES, ids=name)
-def test_paths_in_the_text_exist(page: Path):
+def test_paths_in_the_text_exist(page: Path) -> None:
     """Those of files, from the root of the repository or that of the package."""
     paths = re.findall(r'`((?:\w+/)+\w+\.(?:py|sh|md|json|yaml|xml|msg|srv))`', page.read_text())
     lost = [path for path in paths if not any((root / path).exists() for root in ROOTS)]
     assert not lost
 
 
-def test_every_page_is_in_the_index():
+def test_every_page_is_in_the_index() -> None:
     listed = re.findall(r'^   (\w+)$', (ROOT / 'docs' / 'index.rst').read_text(), re.M)
     pages = [page.stem for page in (ROOT / 'docs').iterdir() if page.suffix in ('.md', '.rst')]
     assert sorted([*listed, 'index']) == sorted(pages)
 
 
-def test_every_picture_is_shown_and_can_be_made_again():
+def test_every_picture_is_shown_and_can_be_made_again() -> None:
     shown = ''.join(page.read_text() for page in PAGES)
     pictures = {path.name: path for path in (ROOT / 'docs' / 'pictures').iterdir()}
     assert [name for name in pictures if f'](pictures/{name})' not in shown] == []
@@ -87,7 +87,7 @@ def test_every_picture_is_shown_and_can_be_made_again():
     assert len(script['reading']().axes) == 4
 
 
-def test_pages_of_the_site_that_load_from_other_hosts_are_found(tmp_path: Path):
+def test_pages_of_the_site_that_load_from_other_hosts_are_found(tmp_path: Path) -> None:
     loads = {
         'font.css': '@import "https://example.org/font";',
         'picture.css': 'body { background: url(//example.org/a.png) }',
@@ -104,5 +104,5 @@ def test_pages_of_the_site_that_load_from_other_hosts_are_found(tmp_path: Path):
     assert {path.name for path in script['loading'](tmp_path)} == set(loads)
 
 
-def test_the_readme_is_short():
+def test_the_readme_is_short() -> None:
     assert len((ROOT / 'README.md').read_text().splitlines()) <= 130

@@ -9,6 +9,7 @@ import re
 import sys
 import warnings
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -118,7 +119,7 @@ def no_targets(image: np.ndarray) -> list[Target]:
     ],
 )
 @pytest.mark.filterwarnings('ignore:.* by keyword')
-def test_arguments_of_another_kind_are_named(call, message: str) -> None:
+def test_arguments_of_another_kind_are_named(call: Any, message: str) -> None:
     with pytest.raises(ValueError, match=message):
         call()
 
@@ -137,7 +138,7 @@ def test_arguments_of_another_kind_are_named(call, message: str) -> None:
         (lambda: render(SMALL).truth, 'Rendering.truth is Rendering.targets now'),
     ],
 )
-def test_former_arguments_work_and_warn(call, message: str) -> None:
+def test_former_arguments_work_and_warn(call: Any, message: str) -> None:
     with pytest.warns(DeprecationWarning, match=message) as caught:
         call()
     assert [warning.filename for warning in caught] == [__file__]

@@ -493,7 +493,9 @@ def test_chunks_without_checksums_are_said_once(
         assert capfd.readouterr().err.count('no checksums') == (not checked)
 
 
-def test_an_output_in_the_recording_is_refused(tmp_path: Path, capfd) -> None:
+def test_an_output_in_the_recording_is_refused(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
     source = recorded(tmp_path)
     for of in (source, next(source.glob('*.mcap'))):
         assert status(of, source / 'out') == 1

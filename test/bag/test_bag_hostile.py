@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterator
 from contextlib import closing, suppress
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 import numpy as np
 import pytest
@@ -125,7 +126,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @given(st.sampled_from(KINDS), generators())
-def test_whatever_is_lost_is_named(folder, kind, random):
+def test_whatever_is_lost_is_named(folder: Path, kind: Any, random: Any) -> None:
     storage, harm = kind
     with TemporaryDirectory(dir=folder) as made:
         source = Path(made) / ('in.bag' if storage == 'ros1' else 'in')

@@ -45,7 +45,9 @@ def ids(path: Path) -> list[list[int]]:
     return [[target.id for target in message.targets] for _, message in bags.answers(path)]
 
 
-def test_a_stack_has_one_answer_with_the_stamp_of_its_last_image(recording, tmp_path, capsys):
+def test_a_stack_has_one_answer_with_the_stamp_of_its_last_image(
+    recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     out = tmp_path / 'out'
     given = '--family', SCENE.family, '--stack', '4', '--expected', '4'
     assert main(['bag', str(recording), str(out), *given]) == 0
@@ -55,7 +57,9 @@ def test_a_stack_has_one_answer_with_the_stamp_of_its_last_image(recording, tmp_
     assert '/image at 0.700000000 s: a stack of 3 of 4 images: no image follows' in said
 
 
-def test_a_run_that_was_broken_off_continues_within_a_stack(recording, tmp_path):
+def test_a_run_that_was_broken_off_continues_within_a_stack(
+    recording: Path, tmp_path: Path
+) -> None:
     stacking = StackSettings(stack=4)
     tasks = [
         BagTask(recording, tmp_path / name / 'out', identification=SETTINGS, stacking=stacking)
@@ -74,7 +78,9 @@ def test_a_run_that_was_broken_off_continues_within_a_stack(recording, tmp_path)
     assert whole == broken
 
 
-def test_what_does_not_belong_together_is_said_and_answered(phases, tmp_path):
+def test_what_does_not_belong_together_is_said_and_answered(
+    phases: list[np.ndarray], tmp_path: Path
+) -> None:
     store = typestore()
     small = phases[2][:-20]
     messages = [

@@ -6,6 +6,7 @@ import json
 import math
 import struct
 from dataclasses import fields, replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -76,7 +77,7 @@ class Hostile:
         ('family', '\ud800', 'a printable text'),
     ],
 )
-def test_what_is_not_accepted_is_named(field, value, accepted):
+def test_what_is_not_accepted_is_named(field: str, value: Any, accepted: str) -> None:
     with pytest.raises(ValueError) as caught:
         checked_targets([GOOD, replace(GOOD, **{field: value})], "detector 'mine'")
     message = str(caught.value)
@@ -85,12 +86,12 @@ def test_what_is_not_accepted_is_named(field, value, accepted):
 
 
 @pytest.mark.parametrize('found', [None, 3, GOOD, [GOOD, 'x'], {GOOD: 1}, Hostile(), [Hostile()]])
-def test_what_is_no_list_of_targets_is_named(found):
+def test_what_is_no_list_of_targets_is_named(found: Any) -> None:
     with pytest.raises(ValueError, match=r"^detector 'mine'.* accepted is a (list of t|T)arget"):
         checked_targets(found, "detector 'mine'")
 
 
-def test_numbers_of_numpy_are_converted():
+def test_numbers_of_numpy_are_converted() -> None:
     target = Target(
         np.int64(7),
         np.uint32(9),
@@ -117,7 +118,7 @@ def test_numbers_of_numpy_are_converted():
     assert all(type(it) is float for it in checked.covariance)
 
 
-def test_what_is_right_stays_as_it_is():
+def test_what_is_right_stays_as_it_is() -> None:
     assert checked_target(GOOD, 'x') is GOOD
 
 
@@ -172,7 +173,7 @@ RESULTS = st.one_of(
 
 
 @given(RESULTS)
-def test_whatever_passes_fits_everywhere(found):
+def test_whatever_passes_fits_everywhere(found: Any) -> None:
     try:
         passed = checked_targets(found, 'detector')
     except ValueError as error:
@@ -213,7 +214,7 @@ class Bad:
         return self.found
 
 
-def test_plug_ins_pass_the_gate():
+def test_plug_ins_pass_the_gate() -> None:
     with pytest.raises(ValueError, match=r"detector 'bad': target 0: id is 5\.5, accepted is an"):
         guarded(Bad([replace(GOOD, id=5.5)]), 5.0)(IMAGE)
     refining = guarded(Bad((replace(GOOD, x=math.nan),)), 5.0)
@@ -223,13 +224,13 @@ def test_plug_ins_pass_the_gate():
         guarded(Bad(KeyError('\ud800')), 5.0)(IMAGE)
 
 
-def test_refinements_pass_the_gate():
+def test_refinements_pass_the_gate() -> None:
     identifier = create_identifier(detector=Bad((replace(GOOD, code=-1),)))
     with pytest.raises(ValueError, match="refine of detector 'bad': target 0: code is -1"):
         identifier.identify(IMAGE.astype(np.uint16))
 
 
-def test_texts_of_others_become_printable():
+def test_texts_of_others_become_printable() -> None:
     for text in ('a\ud800b', 'line\nline', '\x1b[31m', 'x' * 10**6):
         assert printable(text).isprintable() and len(printable(text)) < 3000
     assert reason_of(ValueError(Hostile())).startswith('ValueError')

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+import pytest
 
 from ahf_ros.batch.watch import Arrivals
 from ahf_ros.cli import main
@@ -113,7 +114,9 @@ def test_images_are_identified_as_they_arrive_and_none_twice(tmp_path: Path) -> 
     assert results() == ['a.png', 'b.png', 'c.png', 'd.png']
 
 
-def test_overlays_do_not_arrive_in_the_folder(tmp_path: Path, capsys) -> None:
+def test_overlays_do_not_arrive_in_the_folder(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     command = ['watch', str(tmp_path), '--output', str(tmp_path / 'results')]
     assert main([*command, '--overlay', str(tmp_path)]) == 2
     assert 'accepted is a folder that is not watched' in capsys.readouterr().err

@@ -14,7 +14,7 @@ from benchmarks.rows import normalised_squares
 NORMAL = ('--quick', '--lights', 'normal', '--groups', 'light')
 
 
-def test_a_detector_and_the_same_one_as_a_command(tmp_path, capsys):
+def test_a_detector_and_the_same_one_as_a_command(tmp_path, capsys) -> None:
     command = f'{sys.executable} -m ahf_ros.cli identify --json --family {{family}}'
     rows = []
     for number, method in enumerate([('--detector', 'traditional'), ('--command', command)]):
@@ -36,19 +36,19 @@ def test_a_detector_and_the_same_one_as_a_command(tmp_path, capsys):
     assert other['seconds'] > 0
 
 
-def test_seeds_for_tests_and_for_development_are_kept_apart(capsys):
+def test_seeds_for_tests_and_for_development_are_kept_apart(capsys) -> None:
     with pytest.raises(SystemExit, match='2'):
         identification.main([*NORMAL, '--seeds', '1', '101'])
     assert 'accepted are all below 101 or none' in capsys.readouterr().err
 
 
-def test_every_row_is_a_scene_that_can_be_made():
+def test_every_row_is_a_scene_that_can_be_made() -> None:
     for quick in ([], ['--quick']):
         rows = identification.chosen_cases(identification.parser().parse_args(quick))
         assert len({(row.group, row.name) for row in rows}) == len(rows) >= 50
 
 
-def test_squares_are_in_units_of_the_covariance():
+def test_squares_are_in_units_of_the_covariance() -> None:
     truth = [TrueTarget(1, 100.0, 100.0), TrueTarget(2, 200.0, 100.0)]
     right = Target(1, 71, 100.2, 99.9, 5, 5, covariance=(0.04, 0.0, 0.0, 0.01))
     unknown = Target(2, 75, 200.0, 100.0, 5, 5)

@@ -12,7 +12,7 @@ from benchmarks import limits
 
 @pytest.mark.parametrize('family', ['metashape12', 'gsi', 'dots'])
 @pytest.mark.parametrize('setting', limits.SETTINGS)
-def test_every_row_is_a_scene_that_can_be_made(family, setting):
+def test_every_row_is_a_scene_that_can_be_made(family, setting) -> None:
     options = ['--family', family, '--targets', '50', '--setting', setting]
     for group, count, twice in (('light', 32, 0), ('edge shift', 64, 8), ('exposure', 6, 0)):
         made = limits.parser().parse_args([*options, '--group', group])
@@ -21,7 +21,7 @@ def test_every_row_is_a_scene_that_can_be_made(family, setting):
         assert (len(cells), len(cells) - len(scenes)) == (count, twice)  # one half of an image
 
 
-def test_the_halves_of_an_image_may_be_shifted_in_opposite_directions():
+def test_the_halves_of_an_image_may_be_shifted_in_opposite_directions() -> None:
     made = limits.parser().parse_args(['--group', 'edge shift', '--targets', '20'])
     both, less = (
         limits.case(made, f'radius 10, {name} px', 'normal').make(1)[0]
@@ -32,13 +32,13 @@ def test_the_halves_of_an_image_may_be_shifted_in_opposite_directions():
     assert (both[:, middle:] < 128).sum() > 1.2 * (less[:, middle:] < 128).sum()
 
 
-def test_rows_of_other_groups_are_refused(capsys):
+def test_rows_of_other_groups_are_refused(capsys) -> None:
     with pytest.raises(SystemExit):
         limits.main(['--group', 'exposure', '--rows', 'radius 6, 0.3'])
     assert "accepted are those of the group 'exposure'" in capsys.readouterr().err
 
 
-def test_files_hold_what_is_printed(tmp_path, capsys):
+def test_files_hold_what_is_printed(tmp_path, capsys) -> None:
     output = tmp_path / 'limits_0.12'
     some = ['--rows', 'radius 10, 0.12', '--lights', 'stripe', '--targets', '4', '--seeds', '1']
     assert limits.main([*some, '--detector', 'traditional', '--output', str(output)]) == 0

@@ -37,7 +37,7 @@ def row(text: str, name: str) -> list[str]:
     return [cell.strip() for cell in line.split('|')[2:-1]]
 
 
-def test_the_figures_of_the_paper_stand_beside_ours(measured):
+def test_the_figures_of_the_paper_stand_beside_ours(measured) -> None:
     text, _ = measured
     assert row(text, 'AHF-TI in the paper') == [
         '63 / 68 / 68 (0.263)',
@@ -49,7 +49,7 @@ def test_the_figures_of_the_paper_stand_beside_ours(measured):
     assert float(plain.split('/')[1]) < 50 < float(driven.split('/')[1].split()[0])
 
 
-def test_every_method_is_in_the_json(measured):
+def test_every_method_is_in_the_json(measured) -> None:
     text, path = measured
     records = json.loads(path.read_text())['records']
     names = {record['method'] for record in records}
@@ -63,7 +63,7 @@ def test_every_method_is_in_the_json(measured):
     assert f'{striped["seconds"]:.2f}' in text
 
 
-def test_plots_come_from_an_earlier_run(measured, tmp_path):
+def test_plots_come_from_an_earlier_run(measured, tmp_path) -> None:
     pytest.importorskip('matplotlib')
     text, path = measured
     assert printed('--read', path, '--plots', tmp_path / 'plots') == text
@@ -72,7 +72,7 @@ def test_plots_come_from_an_earlier_run(measured, tmp_path):
     assert picture.std() > 10
 
 
-def test_rival_preprocessors_even_out_the_light():
+def test_rival_preprocessors_even_out_the_light() -> None:
     rows, columns = np.mgrid[:240, :320]
     checks = np.where((rows // 20 + columns // 20) % 2, 1.0, 0.4)
     image = np.rint(checks * (40 + 0.6 * columns)).astype(np.uint8)

@@ -13,7 +13,7 @@ from benchmarks import photographs
 from support import strangers
 
 
-def test_the_truth_names_pictures_and_families_that_can_be_read():
+def test_the_truth_names_pictures_and_families_that_can_be_read() -> None:
     every = strangers.photographs()
     assert len({shown['blob'] for shown in every}) == len(every) > 40
     for shown in every:
@@ -46,7 +46,7 @@ def clone(tmp_path):
     }
 
 
-def test_a_picture_is_read_from_its_clone_and_scored(clone):
+def test_a_picture_is_read_from_its_clone_and_scored(clone) -> None:
     folder, shown = clone
     image = strangers.picture(folder, shown)
     record = photographs.record(image, shown, photographs.WAYS)
@@ -57,7 +57,7 @@ def test_a_picture_is_read_from_its_clone_and_scored(clone):
     assert (by['right'], by['false'], by['missed']) == (0, 3, [moved['targets'][0][0]])
 
 
-def test_a_picture_that_is_not_there_says_what_to_clone(clone, capsys):
+def test_a_picture_that_is_not_there_says_what_to_clone(clone, capsys) -> None:
     folder, shown = clone
     with pytest.raises(ValueError, match=r'no other\.png.*github\.com/somebody/pictures'):
         strangers.picture(folder, {**shown, 'path': 'other.png', 'blob': '0' * 40})

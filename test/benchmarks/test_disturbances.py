@@ -31,7 +31,7 @@ def drawn(occluder: Occluder, seed: int = 2) -> tuple[np.ndarray, np.ndarray]:
 
 
 @pytest.mark.parametrize('name', ['metashape12', 'aicon14', 'aruco_4x4_50'])
-def test_the_truth_is_where_the_marks_are(name):
+def test_the_truth_is_where_the_marks_are(name) -> None:
     sheet = target_sheet(name, np.array([5, 6, 7]), 1, columns=2)
     image = 220.0 - sheet.photograph(Exposure())
     side = cell_pixels(RADIUS)
@@ -50,7 +50,7 @@ def test_the_truth_is_where_the_marks_are(name):
         assert np.average(rows[dot], weights=weight) == pytest.approx(first.y, abs=0.1)
 
 
-def test_a_sheet_is_the_same_every_time_and_another_one_with_another_seed():
+def test_a_sheet_is_the_same_every_time_and_another_one_with_another_seed() -> None:
     exposure = Exposure(occluder=occluders.over_sectors(2, 128.0))
     first, again, other = (
         target_sheet('aicon12', np.arange(1, 4), seed, columns=3).photograph(exposure)
@@ -60,14 +60,14 @@ def test_a_sheet_is_the_same_every_time_and_another_one_with_another_seed():
     assert not np.array_equal(first, other)
 
 
-def test_no_target_is_twice_on_a_sheet():
+def test_no_target_is_twice_on_a_sheet() -> None:
     for name in ('metashape12', 'aruco_4x4_50'):
         sheets = random_numbers(name, 100, 1)
         assert sum(map(len, sheets)) == 100
         assert all(len(set(numbers)) == len(numbers) and 0 not in numbers for numbers in sheets)
 
 
-def test_levels_are_those_asked_for():
+def test_levels_are_those_asked_for() -> None:
     sheet = target_sheet('metashape12', np.array([1]), 1)
     image = sheet.photograph(Exposure(levels=(130.0, 120.0, 0.5)))
     target = sheet.truth[0]
@@ -76,7 +76,7 @@ def test_levels_are_those_asked_for():
     assert np.median(image) - np.median(inside) == pytest.approx(10, abs=1.5)
 
 
-def test_bright_targets_are_dark_ones_inverted():
+def test_bright_targets_are_dark_ones_inverted() -> None:
     exposure = Exposure(levels=(200.0, 100.0, 0.0))
     dark, bright = (
         target_sheet('aicon12', np.array([9]), 1, bright=bright).photograph(exposure)
@@ -86,7 +86,7 @@ def test_bright_targets_are_dark_ones_inverted():
 
 
 @pytest.mark.parametrize('whole', [False, True])
-def test_a_wedge_covers_its_sectors_and_nothing_else(whole):
+def test_a_wedge_covers_its_sectors_and_nothing_else(whole) -> None:
     share, gray = drawn(occluders.over_sectors(2, 99.0, whole=whole))
     assert gray == 99.0
     assert share[DISTANCE < 1.15].max() == 0
@@ -98,7 +98,7 @@ def test_a_wedge_covers_its_sectors_and_nothing_else(whole):
         assert (shares < 0.03).sum() == 10
 
 
-def test_paper_and_finger_and_disc_reach_as_far_as_they_should():
+def test_paper_and_finger_and_disc_reach_as_far_as_they_should() -> None:
     (paper, _), (disc, _), (finger, _) = map(
         drawn, (occluders.paper(2.0, 0.0), occluders.disc(1.0, 0.0), occluders.finger(2.0, 0.0))
     )
@@ -108,7 +108,7 @@ def test_paper_and_finger_and_disc_reach_as_far_as_they_should():
     assert 1.15 < DISTANCE[finger > 0.5].min() < 2.1
 
 
-def test_dirt_covers_a_little_of_the_target_and_hides_ink_and_paper():
+def test_dirt_covers_a_little_of_the_target_and_hides_ink_and_paper() -> None:
     sizes = (1 / RADIUS, 3 / RADIUS)
     for occluder, least, most in (
         (occluders.specks(40, sizes), 0.01, 0.035),
@@ -122,13 +122,13 @@ def test_dirt_covers_a_little_of_the_target_and_hides_ink_and_paper():
     assert DISTANCE[share > 0].max() < 4
 
 
-def test_a_highlight_is_brightest_on_the_band():
+def test_a_highlight_is_brightest_on_the_band() -> None:
     added = occluders.highlight(1.0, 200.0)(PLACE, np.random.default_rng(3))
     assert added.max() == pytest.approx(200, abs=1)
     assert DISTANCE.ravel()[added.argmax()] == pytest.approx(2.875, abs=0.03)
 
 
-def test_look_alikes_are_no_codewords():
+def test_look_alikes_are_no_codewords() -> None:
     generator = np.random.default_rng(1)
     for name in FAMILY_NAMES:
         for kind in LOOKALIKES.values():
@@ -146,7 +146,7 @@ def test_look_alikes_are_no_codewords():
             assert not whole or code.number(word) is None
 
 
-def test_every_row_has_scenes_with_the_targets_of_the_family():
+def test_every_row_has_scenes_with_the_targets_of_the_family() -> None:
     for name in ('metashape16', 'aruco_4x4_50'):
         rows = dict(Targets(name, 2, 1).rows())
         assert len(rows) >= 50
@@ -159,7 +159,7 @@ def test_every_row_has_scenes_with_the_targets_of_the_family():
     )
 
 
-def test_rows_that_are_cut_have_the_border_at_its_distance():
+def test_rows_that_are_cut_have_the_border_at_its_distance() -> None:
     rows = dict(Targets('metashape12', 30, 1).rows())
     sides = set()
     for image, truth in rows['border of the image 2.6 dot radii away']:
@@ -171,7 +171,7 @@ def test_rows_that_are_cut_have_the_border_at_its_distance():
     assert len(sides) == 4
 
 
-def test_counts_say_what_is_certain_and_wrong():
+def test_counts_say_what_is_certain_and_wrong() -> None:
     count = disturbances.Count()
     truth = [TrueTarget(1, 10.0, 10.0), TrueTarget(2, 50.0, 10.0)]
     targets = [
@@ -185,7 +185,7 @@ def test_counts_say_what_is_certain_and_wrong():
     assert str(count) == '1 / 1 + 1 (1)'
 
 
-def test_tables_of_a_few_targets(capsys, tmp_path):
+def test_tables_of_a_few_targets(capsys, tmp_path) -> None:
     arguments = ['--tables', 'disturbances', '--families', 'metashape12', '--count', '6']
     arguments += ['--rows', 'clean', 'border', '--json', str(tmp_path / 'table.json')]
     assert disturbances.main(arguments) == 0

@@ -33,7 +33,7 @@ KEYS = (
 
 
 @pytest.fixture(scope='module')
-def folder(tmp_path_factory) -> Path:
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return a folder with two rendered images and their truth."""
     folder = tmp_path_factory.mktemp('rendered')
     done = ahf('render', folder, *SCENE, '--light', 'normal', 'shadow', '--seed', 4)
@@ -43,7 +43,7 @@ def folder(tmp_path_factory) -> Path:
 
 
 @pytest.fixture(scope='module')
-def results(folder) -> str:
+def results(folder: Path) -> str:
     images = (folder / 'normal_0.3_4.png', folder / 'shadow_0.3_4.png')
     done = ahf('identify', *images, '--detector', 'traditional', '--json')
     assert done.returncode == 0
@@ -51,7 +51,7 @@ def results(folder) -> str:
 
 
 @pytest.fixture
-def identify(folder, capsys) -> Callable[..., tuple[Any, str]]:
+def identify(folder: Path, capsys: pytest.CaptureFixture[str]) -> Callable[..., tuple[Any, str]]:
     """Return a function from options to the result of the first image, and to what is said."""
 
     def identified(*options: object) -> tuple[Any, str]:
@@ -62,14 +62,16 @@ def identify(folder, capsys) -> Callable[..., tuple[Any, str]]:
     return identified
 
 
-def test_rendered_images_have_their_truth(folder):
+def test_rendered_images_have_their_truth(folder: Path) -> None:
     truth = read_truth(folder / 'truth.csv')
     numbers = {name: len(targets) for name, targets in truth.items()}
     assert numbers == {'normal_0.3_4.png': 6, 'shadow_0.3_4.png': 6}
     assert read_image(folder / 'shadow_0.3_4.png').shape == (480, 640)
 
 
-def test_bent_sheets_are_rendered_and_identified(tmp_path, capsys):
+def test_bent_sheets_are_rendered_and_identified(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     folder = tmp_path / 'bent'
     scene = (*SCENE, '--maker', 'bent', '--sheets', 2, '--motion', 0.5, '--distortion', -0.1)
     assert status('render', folder, *scene, '--light', 'normal', '--seed', 5) == 0
@@ -81,7 +83,7 @@ def test_bent_sheets_are_rendered_and_identified(tmp_path, capsys):
     assert row.split()[1:5] == ['6'] * 4, table  # expected, reported, found, right
 
 
-def test_a_series_grows_and_keeps_what_was_there(tmp_path):
+def test_a_series_grows_and_keeps_what_was_there(tmp_path: Path) -> None:
     assert status('render', tmp_path, *SCENE, '--seed', 1) == 0
     first = (tmp_path / 'normal_0.3_1.png').read_bytes()
     assert status('render', tmp_path, *SCENE, '--seed', 2, '--count', 2) == 0
@@ -90,7 +92,7 @@ def test_a_series_grows_and_keeps_what_was_there(tmp_path):
     assert list(read_truth(tmp_path / 'truth.csv')) == names
 
 
-def test_json_is_one_object_an_image(folder, results):
+def test_json_is_one_object_an_image(folder: Path, results: str) -> None:
     first, second = map(json.loads, results.splitlines())
     assert (' '.join(first), ' '.join(first['targets'][0]), ' '.join(first['filter'])) == KEYS
     assert first['image'] == str(folder / 'normal_0.3_4.png')
@@ -101,7 +103,9 @@ def test_json_is_one_object_an_image(folder, results):
     assert 0 < first['elapsed_s'] < 100
 
 
-def test_an_unknown_number_is_estimated_where_that_is_asked_for(identify):
+def test_an_unknown_number_is_estimated_where_that_is_asked_for(
+    identify: Callable[..., tuple[Any, str]],
+) -> None:
     options = ((), ('--estimate-expected',), ('--estimate-expected', '--expected-targets', 6))
     found = [identify('--detector', 'traditional', *more)[0] for more in options]
     of = [(it['expected'], it['estimated']) for it in found]
@@ -109,7 +113,9 @@ def test_an_unknown_number_is_estimated_where_that_is_asked_for(identify):
     assert found[0]['targets'] == found[1]['targets']
 
 
-def test_without_json_standard_output_stays_empty(folder, capsys):
+def test_without_json_standard_output_stays_empty(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     assert status('identify', folder / 'normal_0.3_4.png', '--detector', 'traditional') == 0
     output, errors = capsys.readouterr()
     assert output == ''
@@ -119,7 +125,9 @@ def test_without_json_standard_output_stays_empty(folder, capsys):
     assert 'with --expected-targets N, AHF searches' in hint
 
 
-def test_what_was_looked_for_is_said_where_nothing_is_found(folder, tmp_path, capsys):
+def test_what_was_looked_for_is_said_where_nothing_is_found(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     image = tmp_path / 'empty.png'
     write_image(image, np.tile(np.arange(80, dtype=np.uint8), (60, 1)))
     for options, hint in (
@@ -141,7 +149,9 @@ def test_what_was_looked_for_is_said_where_nothing_is_found(folder, tmp_path, ca
     assert said.endswith('missing.png cannot be read: No such file or directory')
 
 
-def test_targets_of_a_network_are_not_missed_where_they_are_not_in_view(identify, folder):
+def test_targets_of_a_network_are_not_missed_where_they_are_not_in_view(
+    identify: Callable[..., tuple[Any, str]], folder: Path
+) -> None:
     every, _ = identify()
     ids = sorted(target['id'] for target in every['targets'])
     assert len(ids) == 6
@@ -154,7 +164,9 @@ def test_targets_of_a_network_are_not_missed_where_they_are_not_in_view(identify
     assert 'N is not given' not in errors
 
 
-def test_the_former_name_of_the_number_of_targets_works_and_says_so(identify):
+def test_the_former_name_of_the_number_of_targets_works_and_says_so(
+    identify: Callable[..., tuple[Any, str]],
+) -> None:
     for option in ('--expected-targets', '--expected'):
         found, errors = identify(option, 6, '--detector', 'traditional')
         assert found['expected'] == 6
@@ -172,14 +184,16 @@ def tiff_with_unknown_tag(image: np.ndarray) -> bytes:
     return b'II*\0' + start + image.tobytes() + count + entries + bytes(4)
 
 
-def test_warnings_of_image_libraries_are_not_for_users(folder, tmp_path):
+def test_warnings_of_image_libraries_are_not_for_users(folder: Path, tmp_path: Path) -> None:
     image = read_image(folder / 'normal_0.3_4.png')
     (tmp_path / 'scan.tif').write_bytes(tiff_with_unknown_tag(image))
     done = ahf('identify', tmp_path / 'scan.tif', '--quiet', '--detector', 'traditional')
     assert (done.returncode, done.stdout, done.stderr) == (0, '', '')
 
 
-def test_evaluation_of_results_in_a_file_and_in_a_pipe(folder, results, tmp_path):
+def test_evaluation_of_results_in_a_file_and_in_a_pipe(
+    folder: Path, results: str, tmp_path: Path
+) -> None:
     (tmp_path / 'results.jsonl').write_text(results)
     table = ahf('evaluate', folder / 'truth.csv', tmp_path / 'results.jsonl')
     assert (table.returncode, table.stdout) == (0, '')
@@ -191,7 +205,9 @@ def test_evaluation_of_results_in_a_file_and_in_a_pipe(folder, results, tmp_path
     assert together['rmse_xy'] < 0.1
 
 
-def test_evaluation_names_images_without_truth(folder, tmp_path, capsys):
+def test_evaluation_names_images_without_truth(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     line = json.dumps({'image': 'other.png', 'targets': [{'id': 1, 'x': 5, 'y': 5}]})
     (tmp_path / 'results.jsonl').write_text(line)
     assert status('evaluate', folder / 'truth.csv', tmp_path / 'results.jsonl', '--json') == 0
@@ -202,7 +218,9 @@ def test_evaluation_names_images_without_truth(folder, tmp_path, capsys):
     assert (together['expected'], together['recall']) == (12, 0.0)
 
 
-def test_edges_that_are_not_where_they_should_be_are_reported(identify, tmp_path):
+def test_edges_that_are_not_where_they_should_be_are_reported(
+    identify: Callable[..., tuple[Any, str]], tmp_path: Path
+) -> None:
     found = {'targets': [{'id': 7, 'x': 1, 'y': 2, 'edge_shift': -0.75}]}
     (tmp_path / 'program.py').write_text(f'print({json.dumps(found)!r})')
     program = f'{sys.executable} {tmp_path}/program.py'
@@ -212,7 +230,9 @@ def test_edges_that_are_not_where_they_should_be_are_reported(identify, tmp_path
     assert said in errors
 
 
-def test_an_image_that_is_white_is_named_where_nothing_is_identified(tmp_path, capsys):
+def test_an_image_that_is_white_is_named_where_nothing_is_identified(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     image = np.full((200, 300), 255, np.uint8)
     image[:, :30] = 90
     write_image(tmp_path / 'white.png', image)
@@ -221,7 +241,7 @@ def test_an_image_that_is_white_is_named_where_nothing_is_identified(tmp_path, c
     assert said in capsys.readouterr().err
 
 
-def test_overlays_are_written(folder, tmp_path):
+def test_overlays_are_written(folder: Path, tmp_path: Path) -> None:
     drawn = tmp_path / 'drawn'
     arguments = ('--overlay', drawn, '--detector', 'traditional')
     assert status('identify', folder / 'normal_0.3_4.png', *arguments) == 0
@@ -230,7 +250,9 @@ def test_overlays_are_written(folder, tmp_path):
     assert (overlay != read_image(folder / 'normal_0.3_4.png')).mean() > 0.001
 
 
-def test_overlays_of_one_name_are_refused(folder, tmp_path, capsys):
+def test_overlays_of_one_name_are_refused(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     other = tmp_path / 'normal_0.3_4.png'
     other.write_bytes((folder / 'normal_0.3_4.png').read_bytes())
     arguments = ('--overlay', tmp_path, '--detector', 'traditional')
@@ -238,7 +260,9 @@ def test_overlays_of_one_name_are_refused(folder, tmp_path, capsys):
     assert 'overlay would hold several images of the same name' in capsys.readouterr().err
 
 
-def test_stripes_need_the_filter_and_a_search_repeats_itself(tmp_path, capsys):
+def test_stripes_need_the_filter_and_a_search_repeats_itself(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     size = ('--width', 960, '--height', 720, '--targets', 6)
     assert status('render', tmp_path, *size, '--light', 'stripe', '--seed', 2) == 0
     image = tmp_path / 'stripe_0.3_2.png'
@@ -257,14 +281,16 @@ def test_stripes_need_the_filter_and_a_search_repeats_itself(tmp_path, capsys):
     assert {**first, 'elapsed_s': 0} == {**second, 'elapsed_s': 0}
 
 
-def test_a_search_that_ended_early_says_so(identify):
+def test_a_search_that_ended_early_says_so(identify: Callable[..., tuple[Any, str]]) -> None:
     found, said = identify('--expected-targets', 7, '--max-radius', 40)
     assert found['filter']['evaluations'] == 3
     text = f'{found["image"]}: the search ended early, 2 filters in a row show no more targets'
     assert text in said
 
 
-def test_files_that_cannot_be_read_do_not_stop_the_others(folder, tmp_path, capsys):
+def test_files_that_cannot_be_read_do_not_stop_the_others(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     (tmp_path / 'text.png').write_text('not an image')
     write_image(tmp_path / 'flat.png', np.full((50, 50), 9, np.uint8))
     empty = tmp_path / 'empty'
@@ -294,7 +320,9 @@ def test_files_that_cannot_be_read_do_not_stop_the_others(folder, tmp_path, caps
         ('--magic', 'unrecognized arguments: --magic'),
     ],
 )
-def test_bad_options_are_named(capsys, arguments, message):
+def test_bad_options_are_named(
+    capsys: pytest.CaptureFixture[str], arguments: str, message: str
+) -> None:
     given = ('--detector', 'traditional', *arguments.split())
     assert status('identify', 'image.png', *given) == 2
     out, errors = capsys.readouterr()
@@ -313,14 +341,18 @@ def test_bad_options_are_named(capsys, arguments, message):
         ('--maker bent --bend-radius 10', 'bend_radius is 10.0, accepted is a number of at le'),
     ],
 )
-def test_bad_scenes_are_named(tmp_path, capsys, arguments, message):
+def test_bad_scenes_are_named(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], arguments: str, message: str
+) -> None:
     assert status('render', tmp_path / 'new', *arguments.split()) == 2
     assert message in capsys.readouterr().err
     assert not (tmp_path / 'new').exists()
 
 
 @pytest.mark.parametrize('missing', ['truth.csv', 'results.jsonl'])
-def test_files_that_cannot_be_compared_are_named(tmp_path, capsys, missing):
+def test_files_that_cannot_be_compared_are_named(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], missing: str
+) -> None:
     (tmp_path / 'truth.csv').write_text('image,id,x,y\n')
     (tmp_path / 'results.jsonl').touch()
     (tmp_path / missing).unlink()
@@ -337,7 +369,12 @@ def test_files_that_cannot_be_compared_are_named(tmp_path, capsys, missing):
         ('render', BentSettings),
     ],
 )
-def test_help_describes_every_setting(monkeypatch, capsys, command, settings):
+def test_help_describes_every_setting(
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    command: str,
+    settings: Any,
+) -> None:
     monkeypatch.setenv('COLUMNS', '1000')
     assert status(command, '--help') == 0
     words = capsys.readouterr().out
@@ -347,6 +384,6 @@ def test_help_describes_every_setting(monkeypatch, capsys, command, settings):
         assert f'{item.description} Default: {default}; accepted: {item.accepted}.' in words
 
 
-def test_no_command_and_the_version():
+def test_no_command_and_the_version() -> None:
     assert status() == 2
     assert ahf('--version').returncode == 0

@@ -32,7 +32,7 @@ def identified(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str, str
 
 
 @pytest.mark.parametrize('name', FORMATS)
-def test_identify_writes_what_it_prints(identified, name: str):
+def test_identify_writes_what_it_prints(identified: tuple[Path, str, str], name: str) -> None:
     folder, printed, _ = identified
     result = json.loads(printed)
     expected = {str(it['id']): (it['x'], it['y']) for it in result['targets'] if it['id'] >= 0}
@@ -42,14 +42,16 @@ def test_identify_writes_what_it_prints(identified, name: str):
         assert place == pytest.approx(expected[label], abs=0.001)
 
 
-def test_what_was_exported_is_said(identified):
+def test_what_was_exported_is_said(identified: tuple[Path, str, str]) -> None:
     folder, _, messages = identified
     assert f'{folder / "mmvii"}: mmvii, 1 image, 2 files' in messages
     assert f'{folder / "colmap"}: colmap has no control points' in messages
     assert 'control points that no image shows: 0, 1, ' in messages
 
 
-def test_export_of_results_gives_the_same_files(identified, tmp_path: Path):
+def test_export_of_results_gives_the_same_files(
+    identified: tuple[Path, str, str], tmp_path: Path
+) -> None:
     folder = identified[0]
     exports = [f'{name}={tmp_path / name}' for name in FORMATS]
     control = ('--control', folder / 'points.csv', '--control-crs', 'EPSG:25832')
@@ -70,7 +72,13 @@ def test_export_of_results_gives_the_same_files(identified, tmp_path: Path):
         ('nugget,1,2,3\n', 'no control point is a target of the images: the list has nugget'),
     ],
 )
-def test_damaged_control_points_are_named(identified, rows, message, tmp_path, capsys):
+def test_damaged_control_points_are_named(
+    identified: tuple[Path, str, str],
+    rows: str,
+    message: str,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
     (tmp_path / 'points.csv').write_text(rows)
     given = (identified[0] / 'results.jsonl', f'csv={tmp_path / "out"}')
     assert status('export', *given, '--control', tmp_path / 'points.csv') == 1
@@ -78,7 +86,9 @@ def test_damaged_control_points_are_named(identified, rows, message, tmp_path, c
     assert not (tmp_path / 'out').exists()
 
 
-def test_an_export_that_fails_leaves_the_others(identified, tmp_path, capsys):
+def test_an_export_that_fails_leaves_the_others(
+    identified: tuple[Path, str, str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     (tmp_path / 'file').write_text('')
     results = identified[0] / 'results.jsonl'
     exports = [f'odm={tmp_path}', f'csv={tmp_path / "file"}', f'mmvii={tmp_path / "out"}']
@@ -101,6 +111,8 @@ def test_an_export_that_fails_leaves_the_others(identified, tmp_path, capsys):
         ('--export csv=out --control-sigma -1', 2, 'control_sigma is '),
     ],
 )
-def test_what_does_not_fit_is_refused_before_any_image(options, expected, message, capsys):
+def test_what_does_not_fit_is_refused_before_any_image(
+    options: str, expected: int, message: str, capsys: pytest.CaptureFixture[str]
+) -> None:
     assert status('identify', 'a.png', 'other/a.png', *options.split()) == expected
     assert message in capsys.readouterr().err

@@ -128,7 +128,9 @@ def test_commands_and_options_are_completed(tmp_path: Path, line: str, completed
     assert answer.read_text().split() == [completed]
 
 
-def test_a_damaged_image_is_named_and_the_rest_goes_on(tmp_path, capfd):
+def test_a_damaged_image_is_named_and_the_rest_goes_on(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
     scene = render(SceneSettings(width=400, height=300, targets=4, dot_radius=10.0)).image
     whole = cv2.imencode('.jpg', scene)[1].tobytes()
     (tmp_path / 'a.jpg').write_bytes(whole[: len(whole) // 2] + whole[-2:])
@@ -143,7 +145,9 @@ def test_a_damaged_image_is_named_and_the_rest_goes_on(tmp_path, capfd):
     assert 'c.jpg' in said.out
 
 
-def test_what_is_no_file_is_named_at_once_and_the_rest_goes_on(tmp_path, capfd):
+def test_what_is_no_file_is_named_at_once_and_the_rest_goes_on(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
     scene = render(SceneSettings(width=400, height=300, targets=4, dot_radius=10.0)).image
     write_image(tmp_path / 'c.png', scene)
     os.mkfifo(tmp_path / 'a.png')
@@ -158,7 +162,9 @@ def test_what_is_no_file_is_named_at_once_and_the_rest_goes_on(tmp_path, capfd):
         assert status('identify', tmp_path / 'c.png', '--family-file', family) == 2
 
 
-def test_names_cannot_command_a_terminal_or_a_spreadsheet(tmp_path, monkeypatch, capfd):
+def test_names_cannot_command_a_terminal_or_a_spreadsheet(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
     monkeypatch.chdir(tmp_path)
     scene = render(SceneSettings(width=320, height=240, targets=3, dot_radius=8)).image
     write_image('=1+1.png', scene)

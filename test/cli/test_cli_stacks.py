@@ -17,7 +17,7 @@ NAMES = [f'stripe_0.02_{seed}_{phase}.png' for seed in (1, 2) for phase in range
 
 
 @pytest.fixture(scope='module')
-def folder(tmp_path_factory) -> Path:
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return a folder with four phases of two scenes, and their truth."""
     folder = tmp_path_factory.mktemp('phases')
     scene = '--width 480 --height 360 --targets 4 --dot-radius 12 --light stripe --ambient 0.02'
@@ -25,7 +25,7 @@ def folder(tmp_path_factory) -> Path:
     return folder
 
 
-def test_phases_are_one_scene_in_light_that_moves(folder):
+def test_phases_are_one_scene_in_light_that_moves(folder: Path) -> None:
     assert sorted(path.name for path in folder.glob('*.png')) == sorted(NAMES)
     first, second = (read_image(folder / name).astype(float) for name in NAMES[:2])
     assert np.abs(first - second).mean() > 20
@@ -36,7 +36,9 @@ def test_phases_are_one_scene_in_light_that_moves(folder):
     assert values[0] == values[1]
 
 
-def test_every_stack_is_one_result_that_names_its_images(folder, tmp_path, capsys):
+def test_every_stack_is_one_result_that_names_its_images(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     paths = [str(folder / name) for name in NAMES]
     assert status('identify', *paths, FAMILY, '--stack', 4, '--expected-targets', 4, '--json') == 0
     (tmp_path / 'results.jsonl').write_text(capsys.readouterr().out)
@@ -51,7 +53,9 @@ def test_every_stack_is_one_result_that_names_its_images(folder, tmp_path, capsy
     assert (total['right'], total['wrong'], total['expected']) == (32, 0, 32)
 
 
-def test_names_and_folders_say_what_belongs_together(folder, capsys):
+def test_names_and_folders_say_what_belongs_together(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     paths = [str(folder / name) for name in reversed(NAMES)]
     status('identify', *paths, FAMILY, '--stack-by', r'(.*)_\d', '--json')
     results = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
@@ -60,8 +64,8 @@ def test_names_and_folders_say_what_belongs_together(folder, capsys):
 
 
 def test_a_stack_of_several_sizes_is_split_and_what_is_unreadable_is_left_out(
-    folder, tmp_path, capsys
-):
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     paths, seen = [str(folder / name) for name in NAMES[:3]], tmp_path / 'seen'
     write_image(tmp_path / 'other.png', read_image(paths[0])[:-8])
     (tmp_path / 'broken.png').write_bytes(b'nothing')
@@ -80,7 +84,7 @@ def test_a_stack_of_several_sizes_is_split_and_what_is_unreadable_is_left_out(
     ]
 
 
-def test_groups_are_in_the_order_of_their_first_images():
+def test_groups_are_in_the_order_of_their_first_images() -> None:
     images = ['b/x1.png', 'a/x1.png', 'b/x2.png', 'b/x3.png']
     assert stacked(images, 'folder', 1) == [['b/x1.png', 'b/x2.png', 'b/x3.png'], ['a/x1.png']]
     assert stacked(images, 'folder', 2)[0] == ['b/x1.png', 'b/x2.png']
@@ -97,12 +101,16 @@ def test_groups_are_in_the_order_of_their_first_images():
         ('(y).', "which does not match 'stripe"),
     ],
 )
-def test_bad_groups_are_named(folder, capsys, by, message):
+def test_bad_groups_are_named(
+    folder: Path, capsys: pytest.CaptureFixture[str], by: str, message: str
+) -> None:
     assert status('identify', folder / NAMES[0], '--stack-by', by) == 2
     assert message in capsys.readouterr().err
 
 
-def test_a_missing_file_is_no_part_of_a_stack(folder, tmp_path, capsys) -> None:
+def test_a_missing_file_is_no_part_of_a_stack(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     missing = [tmp_path / 'missing.png', tmp_path / 'gone.png']
     assert status('identify', *missing, '--stack=2') == 1
     said = capsys.readouterr().err.splitlines()

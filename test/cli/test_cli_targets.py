@@ -46,7 +46,7 @@ def test_what_is_printed_is_identified_where_it_is(name: str, polarity: str) -> 
 
 
 @pytest.fixture(scope='module')
-def folder(tmp_path_factory) -> Path:
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return a folder with a sheet and its geometry, which a process has written."""
     folder = tmp_path_factory.mktemp('targets')
     options = ['--family', 'metashape12', '--ids', '1-54', '--dot-radius', '4mm', '--page', 'A4']
@@ -93,7 +93,9 @@ def test_the_geometry_has_every_target_and_sheets_repeat_themselves(
     assert (tmp_path / 'again.pdf').read_bytes() == (folder / 'sheet.pdf').read_bytes()
 
 
-def test_the_best_ids_are_printed_and_told(tmp_path: Path, capsys) -> None:
+def test_the_best_ids_are_printed_and_told(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     file = tmp_path / 'best.json'
     assert targets('--best', 20, '-o', tmp_path / 'best.svg', '--geometry', file) == 0
     ids = [target['id'] for target in json.loads(file.read_text())['targets']]
@@ -111,7 +113,11 @@ def test_the_best_ids_are_printed_and_told(tmp_path: Path, capsys) -> None:
     ],
 )
 def test_what_is_not_accepted_leaves_the_old_file(
-    options: list[str], message: str, tmp_path: Path, capsys, monkeypatch
+    options: list[str],
+    message: str,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.chdir(tmp_path)
     file = Path('sheet.pdf')
@@ -121,7 +127,9 @@ def test_what_is_not_accepted_leaves_the_old_file(
     assert file.read_text() == 'old'
 
 
-def test_a_full_disk_leaves_the_old_file_and_the_rest_is_written(tmp_path: Path, capsys) -> None:
+def test_a_full_disk_leaves_the_old_file_and_the_rest_is_written(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     file, geometry = tmp_path / 'sheet.pdf', tmp_path / 'sheet.json'
     file.write_text('old')
     with room_for(5000):
@@ -133,7 +141,7 @@ def test_a_full_disk_leaves_the_old_file_and_the_rest_is_written(tmp_path: Path,
 
 
 def test_without_its_library_a_pdf_is_refused_and_svg_is_not(
-    tmp_path: Path, capsys, monkeypatch
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(sys.modules, 'reportlab', None)
     assert targets('--ids', '1', '-o', tmp_path / 'sheet.pdf') == 2

@@ -6,7 +6,7 @@ from ahf_ros.base.target import UNDECODED, Target
 from ahf_ros.families.claims import best_targets
 
 
-def test_of_targets_each_place_and_each_id_has_one():
+def test_of_targets_each_place_and_each_id_has_one() -> None:
     first = Target(7, 7, 50.0, 50.0, 10.0, 10.0, 0.0, confidence=0.99)
     same_place = Target(8, 8, 60.0, 50.0, 10.0, 10.0, 0.0, confidence=0.98)
     same_id = Target(7, 7, 200.0, 50.0, 10.0, 10.0, 0.0, confidence=0.97)

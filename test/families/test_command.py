@@ -32,7 +32,7 @@ def printing(text: str) -> str:
     return f'print({text!r})'
 
 
-def test_what_a_program_prints_is_what_was_identified(tmp_path):
+def test_what_a_program_prints_is_what_was_identified(tmp_path) -> None:
     found = detector(
         tmp_path,
         'import cv2, json, sys\n'
@@ -46,7 +46,7 @@ def test_what_a_program_prints_is_what_was_identified(tmp_path):
     assert found[1].angle == 0.5
 
 
-def test_the_path_goes_where_the_command_says(tmp_path):
+def test_the_path_goes_where_the_command_says(tmp_path) -> None:
     script = 'import sys; assert sys.argv[1].endswith(".png"); assert sys.argv[2] == "last"\n'
     assert detector(tmp_path, script + printing('{"targets": []}'), '{image} last')(IMAGE) == []
 
@@ -71,13 +71,13 @@ def test_the_path_goes_where_the_command_says(tmp_path):
         ),
     ],
 )
-def test_what_is_not_accepted_is_named(tmp_path, script, message):
+def test_what_is_not_accepted_is_named(tmp_path, script, message) -> None:
     with pytest.raises(ValueError, match=r'^command .*program\.py') as caught:
         detector(tmp_path, script)(IMAGE)
     assert message in str(caught.value)
 
 
-def test_a_program_that_hangs_is_ended_with_all_that_it_started(tmp_path, monkeypatch):
+def test_a_program_that_hangs_is_ended_with_all_that_it_started(tmp_path, monkeypatch) -> None:
     pid = tmp_path / 'pid'
     # The time limit is over once the program has got that far, however slow the machine is.
     clock = SimpleNamespace(monotonic=lambda: 3.0 if pid.exists() else 0.0)
@@ -98,14 +98,14 @@ def test_a_program_that_hangs_is_ended_with_all_that_it_started(tmp_path, monkey
         time.sleep(0.1)
 
 
-def test_a_program_that_writes_without_end_is_ended(tmp_path, monkeypatch):
+def test_a_program_that_writes_without_end_is_ended(tmp_path, monkeypatch) -> None:
     monkeypatch.setattr(module, 'MAXIMUM_OUTPUT', 2**20)
     script = 'import os\nwhile True:\n    os.write(1, bytes(2**16))\n'
     with pytest.raises(ValueError, match='bytes, accepted are at most 1048576'):
         detector(tmp_path, script)(IMAGE)
 
 
-def test_a_program_ends_with_all_that_it_started_in_sessions_of_their_own(tmp_path):
+def test_a_program_ends_with_all_that_it_started_in_sessions_of_their_own(tmp_path) -> None:
     pid = tmp_path / 'pid'
     script = (
         'import subprocess, sys\n'
@@ -121,7 +121,7 @@ def test_a_program_ends_with_all_that_it_started_in_sessions_of_their_own(tmp_pa
 
 
 @pytest.mark.parametrize('when', ['before', 'meanwhile'])
-def test_a_temporary_folder_that_vanishes_is_named(tmp_path, monkeypatch, when):
+def test_a_temporary_folder_that_vanishes_is_named(tmp_path, monkeypatch, when) -> None:
     scratch = tmp_path / 'scratch'
     scratch.mkdir()
     monkeypatch.setattr('tempfile.tempdir', str(scratch))
@@ -133,7 +133,7 @@ def test_a_temporary_folder_that_vanishes_is_named(tmp_path, monkeypatch, when):
         made(IMAGE)
 
 
-def test_a_temporary_folder_that_is_full_is_named(tmp_path, monkeypatch):
+def test_a_temporary_folder_that_is_full_is_named(tmp_path, monkeypatch) -> None:
     monkeypatch.setattr('tempfile.tempdir', str(tmp_path))
     limits = resource.getrlimit(resource.RLIMIT_FSIZE)
     image = np.random.default_rng(0).integers(0, 255, (300, 300), np.uint8)
@@ -164,12 +164,12 @@ def _runs(pid: int) -> bool:
         ('/nowhere/nothing', 'cannot be started: No such file'),
     ],
 )
-def test_a_command_that_is_none(command, message):
+def test_a_command_that_is_none(command, message) -> None:
     with pytest.raises(ValueError, match=message):
         create_detector('command', command=command)(IMAGE)
 
 
-def test_several_threads_at_once_and_no_file_left(tmp_path, monkeypatch):
+def test_several_threads_at_once_and_no_file_left(tmp_path, monkeypatch) -> None:
     monkeypatch.setenv('TMPDIR', str(tmp_path))
     monkeypatch.setattr('tempfile.tempdir', None)
     script = (
@@ -185,7 +185,7 @@ def test_several_threads_at_once_and_no_file_left(tmp_path, monkeypatch):
     assert [path.name for path in tmp_path.iterdir()] == ['program.py']
 
 
-def test_a_program_behind_the_adaptive_filter(tmp_path):
+def test_a_program_behind_the_adaptive_filter(tmp_path) -> None:
     """It identifies one target only in images that are not the one received."""
     script = (
         'import cv2, json, sys\n'

@@ -49,21 +49,21 @@ SURE, FIRST = [True, True], [True, False]
         pytest.param(APART, [30, 29], [1, 1], FIRST, [0, 1], FIRST, id='an uncertain claim'),
     ],
 )
-def test_readings_that_contradict_each_other(places, odds, ids, confidence, kept, certain):
+def test_readings_that_contradict_each_other(places, odds, ids, confidence, kept, certain) -> None:
     assert resolved(places, odds, ids, confidence) == (kept, certain)
 
 
-def test_of_two_claims_to_an_id_the_clearly_surer_one_stays():
+def test_of_two_claims_to_an_id_the_clearly_surer_one_stays() -> None:
     places, odds, ids = [50, 150, 250], [30, 20, 10], [1, 2, 1]
     assert resolved(places, odds, ids, [0.99, 0.98, 0.8])[1] == [True, True, False]
     assert resolved(places, odds, ids, [0.9, 0.8, 0.76])[1] == [False, True, False]
 
 
-def test_two_targets_beyond_doubt_that_have_one_id_were_printed_twice():
+def test_two_targets_beyond_doubt_that_have_one_id_were_printed_twice() -> None:
     assert resolved(APART, [217, 86], [1, 1], [0.999, 0.955])[1] == [False, False]
 
 
-def test_sectors_of_a_band_that_was_read_are_no_dots():
+def test_sectors_of_a_band_that_was_read_are_no_dots() -> None:
     """2.9 radii away, between the edges of the band."""
     places = [50, 50 + 2.9 * RADIUS]
     assert resolved(places, [30, 20], [1, 1], [True, False])[0] == [0]
@@ -80,19 +80,19 @@ def test_sectors_of_a_band_that_was_read_are_no_dots():
 )
 def test_of_two_targets_whose_bands_overlap_only_the_surer_one_is_certain(
     apart, confidence, on_top
-):
+) -> None:
     places = [50, 50 + apart]
     assert resolved(places, [90, 80], [1, 2], confidence)[1] == on_top
     assert resolved(places, [90, 80], [1, 2], [True, False])[1] == [True, False]
 
 
-def test_parts_of_finds_stay_in_order():
+def test_parts_of_finds_stay_in_order() -> None:
     found = hypotheses([50, 150, 250], [3, 2, 1])
     parts = [found.select(np.array([2])), found.select(np.array([0, 1]))]
     assert Hypotheses.joined(parts).marked.tolist() == [1, 3, 2]
 
 
-def test_readings_are_taken_over_where_they_belong():
+def test_readings_are_taken_over_where_they_belong() -> None:
     fit, better = made_up([10.0, 20.0], share=0.8), made_up([20.5])
     unread = Hypotheses.unread(fit, CODE)
     assert not unread.words.any() and not unread.confidence.any()
@@ -119,7 +119,7 @@ def test_readings_are_taken_over_where_they_belong():
     assert not unread.words.any()
 
 
-def test_centres_on_the_dots_of_others():
+def test_centres_on_the_dots_of_others() -> None:
     found = hypotheses([50, 150], [2, 1])
     near = hypotheses([58, 162], [2, 1])
     assert near.on_dots(found).tolist() == [True, False]

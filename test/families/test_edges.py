@@ -53,7 +53,7 @@ def centre_error(fitted: Places) -> float:
     return np.abs(centres(fitted.corners) - centres(CORNERS[None])).max()
 
 
-def test_corners_and_centre():
+def test_corners_and_centre() -> None:
     fitted = fitted_to(drawn())
     assert np.abs(fitted.corners[0] - CORNERS).max() < 0.03
     assert centre_error(fitted) < 0.01
@@ -64,7 +64,7 @@ def test_corners_and_centre():
 
 
 @pytest.mark.parametrize('shift', [-1.0, -0.4, 0.5, 1.0])
-def test_edges_that_moved_are_known_and_move_neither_corners_nor_centres(shift):
+def test_edges_that_moved_are_known_and_move_neither_corners_nor_centres(shift) -> None:
     fitted = fitted_to(drawn(grown=shift))
     assert fitted.edge_shift[0] == pytest.approx(shift, abs=0.1)
     assert np.abs(fitted.corners[0] - CORNERS).max() < 0.1
@@ -73,7 +73,7 @@ def test_edges_that_moved_are_known_and_move_neither_corners_nor_centres(shift):
 
 @pytest.mark.parametrize('side', range(4))
 @pytest.mark.parametrize('cut', [(0.5, 0.9), (0.9, 0.2)], ids=str)
-def test_paper_that_covers_a_side_is_not_taken_for_it(side, cut):
+def test_paper_that_covers_a_side_is_not_taken_for_it(side, cut) -> None:
     # The edge of the paper runs within the border, so many cells inside the side at its ends.
     first, last = SQUARE[side], SQUARE[(side + 1) % 4]
     inwards = (SQUARE[(side + 2) % 4] - last) / len(INK)
@@ -92,7 +92,7 @@ def test_paper_that_covers_a_side_is_not_taken_for_it(side, cut):
     assert np.trace(fitted.covariance[0]) < 0.05**2
 
 
-def test_several_at_once_are_those_one_by_one():
+def test_several_at_once_are_those_one_by_one() -> None:
     starts = np.stack([CORNERS + NEAR, CORNERS - NEAR])
     both = fit_markers(drawn(), starts, np.stack([INK, INK]))
     for start, corners in zip(starts, both.corners, strict=True):
@@ -102,19 +102,19 @@ def test_several_at_once_are_those_one_by_one():
 
 
 @pytest.mark.parametrize('angle', [20, 45, 70, 110])
-def test_edges_of_light_that_cross_the_marker_do_not_move_it(angle):
+def test_edges_of_light_that_cross_the_marker_do_not_move_it(angle) -> None:
     rows, columns = np.indices((HEIGHT, WIDTH))
     across = columns * np.cos(np.radians(angle)) + rows * np.sin(np.radians(angle))
     light = np.where(across % 37 < 18, 200.0, 70.0)
     assert centre_error(fitted_to(drawn(light=light))) < 0.03
 
 
-def test_a_slope_of_the_light_does_not_move_the_centre():
+def test_a_slope_of_the_light_does_not_move_the_centre() -> None:
     light = 40.0 + np.indices((HEIGHT, WIDTH))[1] * 0.9
     assert centre_error(fitted_to(drawn(light=light))) < 0.01
 
 
-def test_where_no_marker_is_places_stay_as_they_are():
+def test_where_no_marker_is_places_stay_as_they_are() -> None:
     noise = np.random.default_rng(1).normal(120, 3, (HEIGHT, WIDTH)).astype(np.float32)
     for gray, corners in (
         (noise, CORNERS),

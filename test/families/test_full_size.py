@@ -40,12 +40,12 @@ def check(shown: Collage, family: str) -> None:
         pytest.param(SQUARE, [150.0, 20.0, 6.0], SQUARE, marks=needs_square_markers),
     ],
 )
-def test_dots_of_any_size_in_one_image(printed, radii, read):
+def test_dots_of_any_size_in_one_image(printed, radii, read) -> None:
     check(collage(radii, printed, seed=5 if read == VENDORS else 0), read)
 
 
 @pytest.mark.parametrize(('light', 'polarity'), [('stripe', 'bright'), ('lattice', 'dark')])
-def test_large_dots_in_projected_light_that_are_seen_from_the_side(light, polarity):
+def test_large_dots_in_projected_light_that_are_seen_from_the_side(light, polarity) -> None:
     shown = collage(
         [150.0, 65.0, 20.0], light=light, ambient=0.12, tilt=40.0, polarity=polarity, seed=3
     )
@@ -53,7 +53,7 @@ def test_large_dots_in_projected_light_that_are_seen_from_the_side(light, polari
     assert estimate_count(shown.image, DetectorSettings(family='metashape12')) == len(shown.truth)
 
 
-def test_limits_are_obeyed_at_every_size():
+def test_limits_are_obeyed_at_every_size() -> None:
     shown = collage([100.0, 50.0, 20.0])
     ids = [target.id for target in shown.truth]
     for limits, expected in (
@@ -77,7 +77,7 @@ def test_limits_are_obeyed_at_every_size():
     ],
     ids=['oblique', 'soft', 'under fringes', 'gsi', 'dots'],
 )
-def test_centres_are_as_right_as_they_say(changes, missed, deviation, least):
+def test_centres_are_as_right_as_they_say(changes, missed, deviation, least) -> None:
     scene = render(
         SceneSettings(**{'width': 1400, 'height': 1000, 'blur': 2, 'seed': 31} | changes)
     )

@@ -121,7 +121,7 @@ def covered():
     return [(image, truth, kinds(blind(image), truth)) for image, truth in shown]
 
 
-def test_no_two_ids_chosen_far_apart_look_alike_where_sectors_are_covered():
+def test_no_two_ids_chosen_far_apart_look_alike_where_sectors_are_covered() -> None:
     assert len(IDS) > 5
     looks = {}
     for number in IDS:
@@ -134,7 +134,7 @@ def test_no_two_ids_chosen_far_apart_look_alike_where_sectors_are_covered():
 
 
 @pytest.mark.lasting
-def test_paper_on_paper_turns_one_id_into_another_unless_they_are_known(covered):
+def test_paper_on_paper_turns_one_id_into_another_unless_they_are_known(covered) -> None:
     assert any(WRONG in blind for _, _, blind in covered)  # no trace is left to see
     informed = create_detector('ring', family='metashape12').expecting(frozenset(IDS))
     read = [kind for image, truth, _ in covered for kind in kinds(informed(image), truth)]
@@ -142,14 +142,14 @@ def test_paper_on_paper_turns_one_id_into_another_unless_they_are_known(covered)
 
 
 @pytest.mark.parametrize('name', ['expected_ids', 'network_ids'])
-def test_ids_that_are_given_reach_the_detector(covered, name):
+def test_ids_that_are_given_reach_the_detector(covered, name) -> None:
     image, truth = next((image, truth) for image, truth, blind in covered if WRONG in blind)
     given = {name: ','.join(map(str, IDS))}
     identifier = create_identifier(family='metashape12', ahf=False, **given)
     assert WRONG not in kinds(identifier.identify(image).targets, truth)
 
 
-def test_ids_that_are_not_expected_are_never_read_as_expected_ones():
+def test_ids_that_are_not_expected_are_never_read_as_expected_ones() -> None:
     sheet = target_sheet(CODE.name, IDS, 31)
     others = frozenset(range(1, len(CODE.words) + 1)) - frozenset(IDS)
     detector = create_detector('ring', family='metashape12')
@@ -163,7 +163,7 @@ class Plugin:
 
     name, family = 'mine', 'metashape12'
 
-    def __init__(self, ids=()):
+    def __init__(self, ids=()) -> None:
         self.ids = ids
 
     def __call__(self, image):
@@ -175,7 +175,7 @@ class Plugin:
         return Plugin(ids)
 
 
-def test_a_detector_of_another_package_is_told_the_ids():
+def test_a_detector_of_another_package_is_told_the_ids() -> None:
     detector = guarded(Plugin(), 5.0)
     assert [it.id for it in detector.expecting(frozenset({7, 3}))(IMAGE)] == [3, 7]
     assert detector(IMAGE) == []

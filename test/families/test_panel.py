@@ -53,7 +53,7 @@ def predicted(truth: Truth, name: str, number: int) -> np.ndarray:
     return np.array(places).reshape(-1, 2)
 
 
-def test_all_photographs_are_there():
+def test_all_photographs_are_there() -> None:
     assert len(list(PANEL.glob('*.png'))) == len(read_truth(PANEL / 'truth.csv')) == 10
     assert WALL.is_file()
 
@@ -69,7 +69,7 @@ def panel(tmp_path_factory) -> Path:
     return results
 
 
-def test_recall_and_wrong_ids_on_the_panel(panel):
+def test_recall_and_wrong_ids_on_the_panel(panel) -> None:
     truth = read_truth(PANEL / 'truth.csv')
     figures = total(evaluate(truth, read_results(panel)).values())
     assert figures.expected == 546
@@ -80,7 +80,7 @@ def test_recall_and_wrong_ids_on_the_panel(panel):
 
 
 @pytest.mark.parametrize('name', FORMATS)
-def test_exports_of_the_panel_hold_what_was_measured(panel, name, tmp_path):
+def test_exports_of_the_panel_hold_what_was_measured(panel, name, tmp_path) -> None:
     """Control coordinates go along; they are in mm, and a format that has none takes none."""
     images = read_measured_images(panel)
     control = Control(read_points(PANEL / 'points.csv'), 'EPSG:25832', 0.01)
@@ -96,14 +96,14 @@ def test_exports_of_the_panel_hold_what_was_measured(panel, name, tmp_path):
     assert max(np.abs(np.subtract(found[key], expected[key])).max() for key in found) < 0.001
 
 
-def test_targets_on_the_panel_are_counted_among_dots_without_code():
+def test_targets_on_the_panel_are_counted_among_dots_without_code() -> None:
     truth = read_truth(PANEL / 'truth.csv')
     for name in sorted(truth)[:2]:
         count = estimate_count(read_image(PANEL / name), DetectorSettings(family='aicon14'))
         assert abs(count - len(truth[name])) <= 2  # measured in all ten: 0 to 2
 
 
-def test_nothing_on_the_panel_is_made_up(panel):
+def test_nothing_on_the_panel_is_made_up(panel) -> None:
     """The truth leaves out targets that the frame cuts; two were decoded there, both right."""
     truth = read_truth(PANEL / 'truth.csv')
     for name, targets in read_results(panel).items():
@@ -122,13 +122,15 @@ def test_nothing_on_the_panel_is_made_up(panel):
         ('metashape14', slice(2, 4), 20),
     ],
 )
-def test_words_of_other_sectors_or_radii_contest_those_that_are_read(family, photographs, most):
+def test_words_of_other_sectors_or_radii_contest_those_that_are_read(
+    family, photographs, most
+) -> None:
     detect = create_detector('ring', family=family)
     some = sorted(PANEL.glob('*.png'))[photographs]
     assert sum(len(detect(read_image(path))) for path in some) <= most
 
 
-def test_each_photograph_has_a_line_with_its_size_and_time(panel):
+def test_each_photograph_has_a_line_with_its_size_and_time(panel) -> None:
     records = [json.loads(line) for line in panel.read_text().splitlines()]
     assert [Path(record['image']) for record in records] == sorted(PANEL.glob('*.png'))
     assert {(record['width'], record['height']) for record in records} == {(2000, 1333)}
@@ -136,7 +138,7 @@ def test_each_photograph_has_a_line_with_its_size_and_time(panel):
 
 
 @pytest.mark.parametrize(('detector', 'measured'), [('ring', 53), ('traditional', 61)])
-def test_a_wall_with_dark_targets(detector, measured):
+def test_a_wall_with_dark_targets(detector, measured) -> None:
     targets = create_detector(detector, family='aicon14', polarity='dark')(read_image(WALL))
     (truth,) = read_truth(WALL_TRUTH).values()
     figures = score(truth, targets)

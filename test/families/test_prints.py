@@ -35,7 +35,7 @@ def drawn(corners: np.ndarray = CORNERS, light: np.ndarray | float = 200.0) -> n
     return (cv2.GaussianBlur(shown, (0, 0), 0.6) * light).astype(np.float32)
 
 
-def test_corners_of_a_small_marker():
+def test_corners_of_a_small_marker() -> None:
     found = lay_prints(drawn(), Places.unmeasured((CORNERS + ROUGH / 2)[None]), ink()[None])
     assert np.abs(found.corners[0] - CORNERS).max() < 0.06
     assert np.abs(centres(found.corners) - centres(CORNERS[None])).max() < 0.03
@@ -45,12 +45,12 @@ def test_corners_of_a_small_marker():
     assert 0 < deviations[0] <= deviations[1] < 0.05
 
 
-def test_the_outline_is_found_before_the_marker_is_read():
+def test_the_outline_is_found_before_the_marker_is_read() -> None:
     found = lay_outlines(drawn(), (CORNERS + ROUGH)[None])
     assert np.abs(found[0] - CORNERS).max() < 0.2
 
 
-def test_what_is_no_marker_stays_as_it_is():
+def test_what_is_no_marker_stays_as_it_is() -> None:
     noise = np.random.default_rng(1).normal(120, 30, (56, 56)).astype(np.float32)
     assert (lay_outlines(noise, CORNERS[None]) == CORNERS).all()
     for gray in (noise, np.full_like(noise, 90), 255 - drawn()):
@@ -59,7 +59,7 @@ def test_what_is_no_marker_stays_as_it_is():
         assert (found.corners[0] == CORNERS).all()
 
 
-def test_sides_are_kept_where_light_is_uneven():
+def test_sides_are_kept_where_light_is_uneven() -> None:
     rows, columns = np.indices((56, 56))
     light = np.where((rows + columns) % 11 < 5, 200.0, 70.0)
     place = CORNERS * 1.5
@@ -70,7 +70,7 @@ def test_sides_are_kept_where_light_is_uneven():
     assert np.trace(even.covariance[0]) < np.trace(sides.covariance[0])
 
 
-def test_markers_at_the_border_of_the_image_and_none_at_all():
+def test_markers_at_the_border_of_the_image_and_none_at_all() -> None:
     found = lay_prints(drawn()[:, 14:], Places.unmeasured((CORNERS - (14, 0))[None]), ink()[None])
     assert found.share[0] == 0
     none = Places.unmeasured(np.zeros((0, 4, 2)))

@@ -38,7 +38,7 @@ def distances(targets: list[Target], scene: SceneSettings) -> np.ndarray:
 
 
 @pytest.mark.parametrize('polarity', ['dark', 'bright'])
-def test_places_become_those_of_the_image(polarity):
+def test_places_become_those_of_the_image(polarity) -> None:
     scene = replace(SCENE, polarity=polarity)
     targets = found(scene)
     refined = refine_centres(rendered(scene).image, targets, [CODE])
@@ -50,7 +50,7 @@ def test_places_become_those_of_the_image(polarity):
 
 
 @pytest.mark.parametrize('polarity', ['dark', 'bright'])
-def test_small_dots_are_not_taken_for_their_own_inside(polarity):
+def test_small_dots_are_not_taken_for_their_own_inside(polarity) -> None:
     scene = replace(SCENE, targets=24, polarity=polarity, dot_radius=7.0, light='normal')
     shown = rendered(scene)
     refined = refine_centres(shown.image, shown.targets, [CODE])
@@ -59,7 +59,7 @@ def test_small_dots_are_not_taken_for_their_own_inside(polarity):
     assert distances(refined, scene).max() < 0.04
 
 
-def test_images_of_16_bit_give_the_same():
+def test_images_of_16_bit_give_the_same() -> None:
     image, targets = rendered(SCENE).image, found(SCENE)
     expected = refine_centres(image, targets, [CODE])
     refined = refine_centres(image.astype(np.uint16) * 16, targets, [CODE])
@@ -68,7 +68,7 @@ def test_images_of_16_bit_give_the_same():
     assert np.abs(np.subtract(*places)).max() < 0.01
 
 
-def test_undecoded_targets_get_the_centre_of_their_dot():
+def test_undecoded_targets_get_the_centre_of_their_dot() -> None:
     targets = [replace(it, id=UNDECODED, code=0) for it in found(SCENE)]
     refined = refine_centres(rendered(SCENE).image, targets, [CODE])
     truth = np.array([(it.x, it.y) for it in rendered(SCENE).targets])
@@ -77,7 +77,7 @@ def test_undecoded_targets_get_the_centre_of_their_dot():
     assert {it.id for it in refined} == {UNDECODED}
 
 
-def test_a_band_that_says_something_else_is_not_used():
+def test_a_band_that_says_something_else_is_not_used() -> None:
     """The centre of the ellipse of an oblique dot is not the image of its centre."""
     scene = replace(SCENE, light='normal', tilt=50.0, focal_length=2.0)
     own, targets = rendered(scene), found(scene)
@@ -91,7 +91,7 @@ def test_a_band_that_says_something_else_is_not_used():
     assert distances(by_band, scene).max() < distances(by_dot, scene).max() / 2
 
 
-def test_targets_without_an_edge_stay_as_they_are():
+def test_targets_without_an_edge_stay_as_they_are() -> None:
     image = rendered(SCENE).image.copy()
     lost, *others = found(SCENE)
     cv2.circle(image, (round(lost.x), round(lost.y)), 70, 90, cv2.FILLED)
@@ -100,20 +100,20 @@ def test_targets_without_an_edge_stay_as_they_are():
     assert all(after != before for after, before in zip(refined[1:], others, strict=True))
 
 
-def test_targets_do_not_move_far():
+def test_targets_do_not_move_far() -> None:
     """An error of a quarter of the radius is another dot, or none."""
     target, *_ = rendered(SCENE).targets
     far = replace(target, x=target.x + 0.25 * target.semi_minor)
     assert refine_centres(rendered(SCENE).image, [far], [CODE]) == [far]
 
 
-def test_nothing_is_refined_to_nothing():
+def test_nothing_is_refined_to_nothing() -> None:
     assert refine_centres(rendered(SCENE).image, [], [CODE]) == []
 
 
 @pytest.mark.lasting
 @pytest.mark.parametrize('name', ['ring', 'traditional'])
-def test_a_filter_leaves_no_trace_in_the_places(name):
+def test_a_filter_leaves_no_trace_in_the_places(name) -> None:
     """The detector is blind to the image as received; AHF refines there all the same."""
     image = rendered(SCENE).image
 

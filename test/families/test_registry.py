@@ -6,6 +6,7 @@ import gc
 import runpy
 import time
 import weakref
+from typing import NoReturn
 
 import cv2
 import numpy as np
@@ -69,12 +70,14 @@ def made(name: str) -> Detector:
         (np.zeros((50, 50, 3), np.uint8), 'shape'),
     ],
 )
-def test_every_detector_is_called_as_registered_and_refuses_what_is_no_image(name, image, message):
+def test_every_detector_is_called_as_registered_and_refuses_what_is_no_image(
+    name, image, message
+) -> None:
     with pytest.raises(ValueError, match=message):
         made(name)(image)
 
 
-def test_every_family_chooses_a_detector():
+def test_every_family_chooses_a_detector() -> None:
     for family in FAMILY_NAMES:
         kind = family.partition('_')[0]
         kind = kind.rstrip('34') if kind in ('cctag3', 'cctag4') else kind
@@ -91,7 +94,7 @@ def test_every_family_chooses_a_detector():
         ('aruco', 'metashape12,aicon12', ['auto, ring, command', 'aruco_4x4_50, ']),
     ],
 )
-def test_a_detector_that_does_not_identify_the_family_is_refused(name, family, accepted):
+def test_a_detector_that_does_not_identify_the_family_is_refused(name, family, accepted) -> None:
     with pytest.raises(ValueError) as caught:
         create_detector(name, family=family)
     message = str(caught.value)
@@ -99,18 +102,18 @@ def test_a_detector_that_does_not_identify_the_family_is_refused(name, family, a
     assert all(part in message for part in accepted)
 
 
-def test_a_detector_reads_all_families_that_it_can():
+def test_a_detector_reads_all_families_that_it_can() -> None:
     names = 'auto', 'ring', 'traditional', 'gsi_published', 'command'
     read = [create_detector(name, family='auto', command='program').family for name in names]
     assert read == ['auto', ','.join(KINDS['ring']), 'metashape12', 'gsi', 'auto']
 
 
-def test_a_family_that_is_not_there_is_refused_with_those_that_are():
+def test_a_family_that_is_not_there_is_refused_with_those_that_are() -> None:
     with pytest.raises(ValueError, match=r"family is 'aruco', accepted is .*, apriltag_36h11"):
         create_detector(family='aruco')
 
 
-def test_only_families_that_can_be_counted_are_estimated():
+def test_only_families_that_can_be_counted_are_estimated() -> None:
     assert estimator(DetectorSettings(family='aicon12'))
     square = DetectorSettings(family='aruco_4x4_50')
     message = (
@@ -123,7 +126,7 @@ def test_only_families_that_can_be_counted_are_estimated():
 
 
 @pytest.mark.parametrize('name', ALL)
-def test_refinement_drafts_and_patience_are_part_of_the_contract(name):
+def test_refinement_drafts_and_patience_are_part_of_the_contract(name) -> None:
     detector = made(name)
     assert isinstance(detector, Refiner) == (not name.endswith('_published') and name != 'command')
     assert isinstance(detector, Drafter) == (name in SQUARES)
@@ -131,12 +134,12 @@ def test_refinement_drafts_and_patience_are_part_of_the_contract(name):
     assert isinstance(detector, EarlyStopping) == (name in ('ring', 'gsi', 'dots'))
 
 
-def test_an_unknown_detector_is_refused_by_name():
+def test_an_unknown_detector_is_refused_by_name() -> None:
     with pytest.raises(ValueError, match=r"detector is 'magic', accepted is one of .*traditional"):
         create_detector('magic')
 
 
-def test_settings_reach_the_detector():
+def test_settings_reach_the_detector() -> None:
     settings = DetectorSettings(family='aicon14')
     assert create_detector('traditional', settings=settings).settings == settings
 
@@ -154,7 +157,7 @@ def test_settings_reach_the_detector():
         ({'report_undecoded': 1}, r'report_undecoded is 1, accepted is true or false'),
     ],
 )
-def test_settings_that_make_no_sense_are_refused(change, message):
+def test_settings_that_make_no_sense_are_refused(change, message) -> None:
     with pytest.raises(ValueError, match=message):
         DetectorSettings(**change)
 
@@ -166,7 +169,7 @@ def added(tmp_path, monkeypatch, module: str, body: str):
     return runpy.run_path(detectors.__file__)
 
 
-def test_a_detector_of_another_package(tmp_path, monkeypatch):
+def test_a_detector_of_another_package(tmp_path, monkeypatch) -> None:
     registry = added(tmp_path, monkeypatch, 'package_with_detector', EXAMPLE.read_text())
     assert registry['DETECTOR_NAMES'] == (*DETECTOR_NAMES, 'mine')
     detector = registry['create_detector']('mine', min_radius=5.0, detector_timeout=600.0)
@@ -178,7 +181,7 @@ def test_a_detector_of_another_package(tmp_path, monkeypatch):
     assert identify(image, detector=detector, expected_targets=1).count == 1
 
 
-def test_a_detector_of_another_package_that_cannot_be_imported(tmp_path, monkeypatch):
+def test_a_detector_of_another_package_that_cannot_be_imported(tmp_path, monkeypatch) -> None:
     registry = added(tmp_path, monkeypatch, 'package_that_is_broken', 'import nothing_like_this')
     assert registry['create_detector']('ring').name == 'ring'
     with pytest.raises(ValueError, match="detector is 'mine', but package_that_is_broken:MyDet"):
@@ -207,7 +210,7 @@ class MyDetector:
 )
 def test_a_detector_of_another_package_that_cannot_be_made(
     tmp_path, monkeypatch, number, family, made, reason
-):
+) -> None:
     module = f'package_not_made_{number}'
     registry = added(tmp_path, monkeypatch, module, HOSTILE.format(family=family, made=made))
     with pytest.raises(ValueError) as raised:
@@ -221,7 +224,7 @@ class Plugin:
 
     name = family = 'mine'
 
-    def __init__(self, call):
+    def __init__(self, call) -> None:
         self._call = call
 
     def __call__(self, image):
@@ -230,7 +233,7 @@ class Plugin:
         finally:
             image[:] = 0
 
-    def refine(self, image, targets):
+    def refine(self, image, targets) -> NoReturn:
         raise RuntimeError('no GPU')
 
 
@@ -246,7 +249,7 @@ class Raising(Target):
 
 
 def failing(error):
-    def fail(image):
+    def fail(image) -> NoReturn:
         raise error
 
     return fail
@@ -263,7 +266,7 @@ def failing(error):
         (lambda _: [Raising(7, 19, 1.0, 2.0, 4.0, 3.0)], 'failed: RuntimeError: no fields'),
     ],
 )
-def test_no_failure_and_no_result_of_another_package_gets_past_its_guard(call, message):
+def test_no_failure_and_no_result_of_another_package_gets_past_its_guard(call, message) -> None:
     detector = guarded(Plugin(call), 0.2 if 'longer' in message else 600.0)
     image = RAMP.copy()
     with pytest.raises(ValueError) as raised:
@@ -272,15 +275,15 @@ def test_no_failure_and_no_result_of_another_package_gets_past_its_guard(call, m
     assert (image == RAMP).all()
 
 
-def test_a_refinement_that_fails():
+def test_a_refinement_that_fails() -> None:
     with pytest.raises(ValueError, match="detector 'mine' failed: RuntimeError: no GPU"):
         guarded(Plugin(list), 600.0).refine(RAMP, [])
 
 
-def test_no_image_that_a_detector_failed_on_stays_in_memory():
+def test_no_image_that_a_detector_failed_on_stays_in_memory() -> None:
     images = []
 
-    def fail(image):
+    def fail(image) -> NoReturn:
         images.append(weakref.ref(image))
         raise RuntimeError('no')
 
@@ -297,7 +300,7 @@ def test_no_image_that_a_detector_failed_on_stays_in_memory():
         gc.enable()
 
 
-def test_a_search_ends_when_a_detector_hangs_in_it():
+def test_a_search_ends_when_a_detector_hangs_in_it() -> None:
     plugin = Plugin(lambda image: time.sleep(3600) if image.max() > 100 else [])
     assert identify(RAMP, detector=guarded(plugin, 600.0), expected_targets=0).targets == ()
     with pytest.raises(ValueError, match='took longer than detector_timeout'):

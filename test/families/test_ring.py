@@ -29,7 +29,7 @@ LIGHTS = [('dark', 'stripe'), ('bright', 'lattice')]
 
 @pytest.mark.parametrize(('polarity', 'light'), LIGHTS)
 @pytest.mark.parametrize('name', FAMILY_NAMES)
-def test_all_targets_under_stripes_and_lattices(name, polarity, light):
+def test_all_targets_under_stripes_and_lattices(name, polarity, light) -> None:
     figures = scored(rendered(replace(SMALL, family=name, polarity=polarity, light=light)))
     assert counts(figures) == (6, 0, 0)
     *others, worst = errors_of(figures)
@@ -40,7 +40,7 @@ def test_all_targets_under_stripes_and_lattices(name, polarity, light):
 @pytest.mark.lasting
 @pytest.mark.parametrize(('polarity', 'light'), LIGHTS)
 @pytest.mark.parametrize('name', FAMILY_NAMES)
-def test_deep_shadow_costs_a_target_at_most_and_no_wrong_id(name, polarity, light):
+def test_deep_shadow_costs_a_target_at_most_and_no_wrong_id(name, polarity, light) -> None:
     scene = replace(SMALL, family=name, polarity=polarity, light=light, ambient=0.12)
     figures = scored(rendered(scene))
     assert (figures.wrong, figures.false_positives) == (0, 0)
@@ -64,7 +64,7 @@ SOFT = replace(SMALL, width=900, height=640, targets=5, blur=3.0)
     ],
     ids=['smallest', 'small', 'large', 'oblique', 'soft and small', 'soft', 'soft and large'],
 )
-def test_sizes_and_views(scene, limit):
+def test_sizes_and_views(scene, limit) -> None:
     figures = scored(rendered(scene))
     assert counts(figures) == (scene.targets, 0, 0)
     assert errors_of(figures)[-1] < limit
@@ -72,7 +72,7 @@ def test_sizes_and_views(scene, limit):
 
 @pytest.mark.lasting
 @pytest.mark.parametrize('light', ['stripe', 'fine_stripe', 'lattice'])
-def test_oblique_views_under_stripes_and_lattices(light):
+def test_oblique_views_under_stripes_and_lattices(light) -> None:
     view = SceneSettings(width=1000, height=600, targets=12, tilt=64.0, focal_length=3.0, seed=1)
     figures = scored(rendered(replace(view, light=light, ambient=0.12)))
     assert (figures.wrong, figures.false_positives) == (0, 0)
@@ -81,14 +81,14 @@ def test_oblique_views_under_stripes_and_lattices(light):
 
 @pytest.mark.lasting
 @pytest.mark.parametrize(('light', 'enough'), [('normal', 20), ('stripe', 16)])
-def test_small_oblique_targets(light, enough):
+def test_small_oblique_targets(light, enough) -> None:
     view = SceneSettings(width=1100, height=800, targets=20, dot_radius=7.0, tilt=60.0, seed=11)
     figures = scored(rendered(replace(view, focal_length=3.0, light=light, ambient=0.3)))
     assert (figures.wrong, figures.false_positives) == (0, 0)
     assert figures.right >= enough
 
 
-def test_ellipse_and_code_are_those_of_the_target():
+def test_ellipse_and_code_are_those_of_the_target() -> None:
     scene = rendered(SMALL)
     for target, true in zip(identified(scene.image), scene.targets, strict=True):
         assert (target.id, target.code) == (true.id, true.code)
@@ -98,18 +98,18 @@ def test_ellipse_and_code_are_those_of_the_target():
 
 
 @pytest.mark.parametrize('light', ['normal', 'stripe', 'lattice'])
-def test_an_image_without_targets_shows_none(light):
+def test_an_image_without_targets_shows_none(light) -> None:
     scene = replace(SMALL, width=1000, height=800, targets=0, distractors=20, light=light)
     assert identified(rendered(scene).image) == []
 
 
-def test_distractors_leave_targets_alone():
+def test_distractors_leave_targets_alone() -> None:
     scene = replace(SMALL, width=1000, height=800, distractors=10, light='stripe')
     assert counts(scored(rendered(scene))) == (6, 0, 0)
 
 
 @pytest.mark.parametrize('polarity', ['dark', 'bright'])
-def test_polarity_is_found_or_obeyed(polarity):
+def test_polarity_is_found_or_obeyed(polarity) -> None:
     scene = rendered(replace(SMALL, polarity=polarity))
     other = 'bright' if polarity == 'dark' else 'dark'
     found = identified(scene.image, polarity=polarity)
@@ -117,7 +117,7 @@ def test_polarity_is_found_or_obeyed(polarity):
     assert identified(scene.image, polarity=other) == []
 
 
-def test_only_dots_between_the_smallest_and_the_largest_radius_are_reported():
+def test_only_dots_between_the_smallest_and_the_largest_radius_are_reported() -> None:
     scene = rendered(SMALL)
     by_size = sorted(scene.targets, key=lambda target: target.semi_major)
     between = (by_size[2].semi_major + by_size[3].semi_major) / 2
@@ -127,7 +127,7 @@ def test_only_dots_between_the_smallest_and_the_largest_radius_are_reported():
     assert large == {target.id for target in by_size[3:]}
 
 
-def test_dots_without_a_code_are_reported_on_request():
+def test_dots_without_a_code_are_reported_on_request() -> None:
     image = np.full((200, 300), 220, np.uint8)
     cv2.circle(image, (90, 100), 10, 30, -1)
     cv2.circle(image, (210, 100), 10, 30, -1)
@@ -140,7 +140,7 @@ def test_dots_without_a_code_are_reported_on_request():
     assert max(it.confidence for it in found) < 0.5
 
 
-def test_decoded_targets_are_the_same_when_dots_are_reported():
+def test_decoded_targets_are_the_same_when_dots_are_reported() -> None:
     rendering = rendered(SMALL)
     found = identified(rendering.image, report_undecoded=True)
     decoded, alone = [it for it in found if it.id != UNDECODED], identified(rendering.image)
@@ -150,7 +150,7 @@ def test_decoded_targets_are_the_same_when_dots_are_reported():
     assert np.allclose(*centres, rtol=0, atol=1e-6)
 
 
-def test_an_id_is_reported_once_or_not_at_all():
+def test_an_id_is_reported_once_or_not_at_all() -> None:
     rendering = rendered(SMALL)
     twice = np.hstack([rendering.image, rendering.image])
     ids = [target.id for target in identified(twice)]
@@ -171,7 +171,7 @@ def test_an_id_is_reported_once_or_not_at_all():
 @pytest.mark.lasting
 @pytest.mark.parametrize('kept', [0.5, 1.5, 2.5, 3.2])
 @pytest.mark.parametrize('name', FAMILY_NAMES)
-def test_a_target_that_the_frame_cuts_is_not_guessed(name, kept):
+def test_a_target_that_the_frame_cuts_is_not_guessed(name, kept) -> None:
     rendering = rendered(replace(SMALL, family=name))
     cut = min(rendering.targets, key=lambda target: target.x)
     left = round(cut.x - kept * cut.semi_major)
@@ -185,7 +185,7 @@ def test_a_target_that_the_frame_cuts_is_not_guessed(name, kept):
 
 
 @pytest.mark.lasting
-def test_a_covered_sector_is_not_guessed():
+def test_a_covered_sector_is_not_guessed() -> None:
     rendering = rendered(SMALL)
     for turn in np.arange(0, 360, 45):
         image = rendering.image.copy()
@@ -217,13 +217,13 @@ def test_a_covered_sector_is_not_guessed():
         partial(refine_centres, targets=[], families=[CODE]),
     ],
 )
-def test_what_is_no_image_is_refused(take, image):
+def test_what_is_no_image_is_refused(take, image) -> None:
     with pytest.raises(ValueError, match=r'image .*accepted'):
         take(image)
 
 
 @pytest.mark.parametrize('shape', [(16, 16), (16, 3000), (17, 333)])
-def test_the_smallest_images(shape):
+def test_the_smallest_images(shape) -> None:
     image = np.random.default_rng(0).integers(0, 256, shape).astype(np.uint8)
     assert identified(image) == []
 
@@ -251,7 +251,7 @@ def sheet(name: str = 'metashape12', bright: bool = False) -> Sheet:
         *((name, False, (160, 140, 1.0), 0.1) for name in FAMILY_NAMES),
     ],
 )
-def test_faint_targets_are_identified(name, bright, levels, precision):
+def test_faint_targets_are_identified(name, bright, levels, precision) -> None:
     of = sheet(name, bright)
     image = of.photograph(Exposure(levels=levels))
     figures = score(of.truth, identified(image, family=name))
@@ -260,14 +260,14 @@ def test_faint_targets_are_identified(name, bright, levels, precision):
 
 
 @pytest.mark.parametrize('light', [3.0, 4.0])
-def test_over_exposed_targets_are_identified(light):
+def test_over_exposed_targets_are_identified(light) -> None:
     figures = score(sheet().truth, identified(sheet().photograph(Exposure(light=light))))
     assert counts(figures) == (4, 0, 0)
     assert np.abs(figures.errors).max() < 0.05
 
 
 @pytest.mark.parametrize(('levels', 'sharpened'), [((300, 45, 1.5), 0.0), ((230, 45, 1.0), 2.0)])
-def test_bright_marks_that_a_camera_clips_or_sharpens_are_read(levels, sharpened):
+def test_bright_marks_that_a_camera_clips_or_sharpens_are_read(levels, sharpened) -> None:
     of = sheet(bright=True)
     image = of.photograph(Exposure(levels=levels))
     blurred = cv2.GaussianBlur(image, (0, 0), 1.5)
@@ -276,7 +276,7 @@ def test_bright_marks_that_a_camera_clips_or_sharpens_are_read(levels, sharpened
 
 
 @pytest.mark.parametrize('light', ['normal', 'stripe', 'lattice'])
-def test_an_image_of_clear_targets_is_read_once(light):
+def test_an_image_of_clear_targets_is_read_once(light) -> None:
     image, settings = (
         rendered(replace(SMALL, light=light)).image,
         DetectorSettings(family='metashape12'),
@@ -287,7 +287,7 @@ def test_an_image_of_clear_targets_is_read_once(light):
     assert once.certain.sum() >= 6
 
 
-def test_faint_and_clear_targets_in_one_image():
+def test_faint_and_clear_targets_in_one_image() -> None:
     of = sheet()
     clear, faint = of.photograph(Exposure()), of.photograph(Exposure(levels=(150, 130, 1.0)))
     image, settings = (
@@ -304,7 +304,7 @@ def test_faint_and_clear_targets_in_one_image():
     assert added[:, 0].min() > clear.shape[1]
 
 
-def test_faint_marks_that_are_no_targets_stay_unread():
+def test_faint_marks_that_are_no_targets_stay_unread() -> None:
     generator = np.random.default_rng(4)
     marks = mark_sheet([other_sectors(CODE, generator) for _ in range(6)], 1)
     faint, clear = Exposure(levels=(130, 110, 1.0)), Exposure()
@@ -329,7 +329,7 @@ def whole_sheet() -> Sheet:
 
 @pytest.mark.lasting
 @pytest.mark.parametrize('sight', COVERED)
-def test_what_is_covered_costs_targets_and_gives_no_wrong_one(sight):
+def test_what_is_covered_costs_targets_and_gives_no_wrong_one(sight) -> None:
     exposure, minimum = COVERED[sight]
     targets = identified(whole_sheet().photograph(exposure))
     figures = score(whole_sheet().truth, targets)
@@ -338,7 +338,7 @@ def test_what_is_covered_costs_targets_and_gives_no_wrong_one(sight):
 
 @pytest.mark.lasting
 @pytest.mark.parametrize('read_as', [name for name in FAMILY_NAMES if name != 'metashape12'])
-def test_targets_of_another_family_are_not_reported(read_as):
+def test_targets_of_another_family_are_not_reported(read_as) -> None:
     assert not identified(whole_sheet().photograph(Exposure()), family=read_as)
 
 
@@ -356,7 +356,7 @@ def seen(**changes):
 @pytest.mark.lasting
 @pytest.mark.parametrize('polarity', ['dark', 'bright'])
 @pytest.mark.parametrize('edge_shift', [-1.0, -0.6, 0.6, 1.0])
-def test_shifted_edges_cost_no_target_and_are_reported(edge_shift, polarity):
+def test_shifted_edges_cost_no_target_and_are_reported(edge_shift, polarity) -> None:
     figures, shifts = seen(polarity=polarity, edge_shift=edge_shift)
     plain, _ = seen(polarity=polarity)
     assert counts(figures) == (20, 0, 0)
@@ -365,7 +365,7 @@ def test_shifted_edges_cost_no_target_and_are_reported(edge_shift, polarity):
 
 
 @pytest.mark.parametrize('overexposure', [2.0, 4.0])
-def test_edges_of_over_exposed_targets_are_shifted(overexposure):
+def test_edges_of_over_exposed_targets_are_shifted(overexposure) -> None:
     (figures, shifts), (_, as_printed) = seen(overexposure=overexposure), seen(polarity='dark')
     assert counts(figures) == (20, 0, 0)
     assert np.median([*shifts.values()]) < np.median([*as_printed.values()]) - 0.1

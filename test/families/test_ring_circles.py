@@ -13,7 +13,7 @@ CODE = family('metashape12')
 
 @pytest.mark.parametrize('start', [0.0, 0.7, 2 * np.pi - 0.01])
 @pytest.mark.parametrize('polarity', [1, -1])
-def test_a_marked_sector_has_an_inner_and_an_outer_edge(start, polarity):
+def test_a_marked_sector_has_an_inner_and_an_outer_edge(start, polarity) -> None:
     """Sectors are counted counter-clockwise as seen, which is towards -y."""
     circles = target_circles(
         np.array([0b000000000100]), np.array([start]), np.array([polarity]), 10, CODE
@@ -28,7 +28,7 @@ def test_a_marked_sector_has_an_inner_and_an_outer_edge(start, polarity):
         assert set(circles.polarity[0, there]) == {expected}
 
 
-def test_the_number_of_edges_is_that_of_the_marked_sectors():
+def test_the_number_of_edges_is_that_of_the_marked_sectors() -> None:
     words, polarity = np.array([0b000001000111, 0b111111111110]), np.array([1, 1])
     circles = target_circles(words, np.zeros(2), polarity, 10, CODE)
     marked = (circles.polarity[:, circles.line > 1] != 0).sum(axis=1)

@@ -63,13 +63,13 @@ def matches(targets: list[Target], truth: list[tuple[str, int, float, float]]) -
         *((THREE, 'normal', families) for families in (','.join(THREE), 'auto')),
     ],
 )
-def test_every_target_says_its_family(shown, light, families):
+def test_every_target_says_its_family(shown, light, families) -> None:
     image, truth = side_by_side(*(scene(name, light) for name in shown))
     assert matches(identified(image, family=families), truth)
 
 
 @pytest.mark.parametrize('name', RING_NAMES)
-def test_all_families_together_read_what_the_one_that_is_there_reads(name):
+def test_all_families_together_read_what_the_one_that_is_there_reads(name) -> None:
     image = rendered(
         replace(SMALL, width=800, height=600, targets=8, family=name, light='stripe')
     ).image
@@ -78,7 +78,7 @@ def test_all_families_together_read_what_the_one_that_is_there_reads(name):
     assert [it.key for it in together] == [it.key for it in alone]
 
 
-def test_families_that_no_dot_shows_are_not_chosen():
+def test_families_that_no_dot_shows_are_not_chosen() -> None:
     shown = scene('metashape14')
     gray = shown.image.astype(np.float32)
     x, y = zip(*((it.x, it.y) for it in shown.targets), strict=True)
@@ -89,7 +89,7 @@ def test_families_that_no_dot_shows_are_not_chosen():
         assert choose(gray, dots, others) == []
 
 
-def test_centres_are_refined_by_each_target_s_own_family():
+def test_centres_are_refined_by_each_target_s_own_family() -> None:
     image, truth = side_by_side(*map(scene, TWO))
     detector = create_detector('ring', family=','.join(TWO))
     moved = [replace(it, x=it.x + 0.5, y=it.y - 0.5) for it in detector(image)]
@@ -107,7 +107,7 @@ def sheet(*marks: tuple[str, int]) -> np.ndarray:
     return mark_sheet([ink(*mark) for mark in marks], 7).photograph(Exposure())
 
 
-def test_an_id_of_two_families_is_two_targets():
+def test_an_id_of_two_families_is_two_targets() -> None:
     image = sheet(*((name, family(name).word(9)) for name in TWO))
     keys = [it.key for it in identified(image, family=','.join(TWO))]
     assert keys == [('aicon14', 9), ('metashape12', 9)]
@@ -115,7 +115,7 @@ def test_an_id_of_two_families_is_two_targets():
 
 @pytest.mark.parametrize('name', SHARED)
 @pytest.mark.parametrize('families', ['auto', ''])
-def test_a_print_of_three_families_is_of_the_family_beside_it(name, families):
+def test_a_print_of_three_families_is_of_the_family_beside_it(name, families) -> None:
     """The print is the same in each image; what is beside it is not."""
     others = [(name, int(family(name).words[index])) for index in (20, 40)]
     image = sheet(('metashape12', SHARED['metashape12']), *others)
@@ -125,7 +125,7 @@ def test_a_print_of_three_families_is_of_the_family_beside_it(name, families):
 
 
 @pytest.mark.parametrize('name', SHARED)
-def test_a_print_of_three_families_alone_is_of_the_one_that_is_named(name):
+def test_a_print_of_three_families_alone_is_of_the_one_that_is_named(name) -> None:
     image = sheet(('metashape12', SHARED['metashape12']))
     assert [(it.family, it.code) for it in identified(image, family=name)] == [
         (name, SHARED[name])
@@ -133,7 +133,7 @@ def test_a_print_of_three_families_alone_is_of_the_one_that_is_named(name):
 
 
 @pytest.mark.parametrize('families', ['auto', 'metashape16,metashape12'])
-def test_a_print_of_three_families_alone_is_of_none(families):
+def test_a_print_of_three_families_alone_is_of_none(families) -> None:
     image = sheet(('metashape12', SHARED['metashape12']))
     assert identified(image, family=families) == []
     dots = identified(image, family=families, report_undecoded=True)
@@ -141,22 +141,22 @@ def test_a_print_of_three_families_alone_is_of_none(families):
     assert all((it.id, it.family) == (UNDECODED, '') for it in centre)
 
 
-def test_targets_of_another_family_do_not_settle_a_print():
+def test_targets_of_another_family_do_not_settle_a_print() -> None:
     marks = [('aicon14', int(family('aicon14').words[index])) for index in (20, 40, 60, 80)]
     targets = identified(sheet(('metashape12', SHARED['metashape12']), *marks), family='auto')
     assert sorted(it.code for it in targets) == sorted(word for _, word in marks)
 
 
-def test_bands_of_other_radii_are_not_read():
+def test_bands_of_other_radii_are_not_read() -> None:
     assert identified(scene('aicon14').image, family='metashape14') == []
 
 
-def test_targets_of_several_families_are_counted():
+def test_targets_of_several_families_are_counted() -> None:
     image, truth = side_by_side(*map(scene, TWO))
     assert estimator(DetectorSettings(family='auto'))(image) == len(truth)
 
 
-def test_both_prints_are_found_among_the_many_dots_of_a_lattice():
+def test_both_prints_are_found_among_the_many_dots_of_a_lattice() -> None:
     wide = replace(SMALL, width=900, height=700, targets=8, light='lattice', ambient=0.12)
     image = np.hstack([rendered(replace(wide, family=name)).image for name in TWO])
     names = [target.family for target in identified(image, family='metashape12,aicon14')]
@@ -166,13 +166,13 @@ def test_both_prints_are_found_among_the_many_dots_of_a_lattice():
 
 @pytest.mark.parametrize('families', ['cct10', 'cct12'])
 @pytest.mark.parametrize('light', ['normal', 'stripe'])
-def test_rings_of_all_words_have_the_numbers_of_their_programs(families, light):
+def test_rings_of_all_words_have_the_numbers_of_their_programs(families, light) -> None:
     shown = scene(families, light)
     truth = [(it.family, it.id, it.x, it.y) for it in shown.targets]
     assert matches(identified(shown.image, family=families), truth)
 
 
-def test_targets_of_a_small_family_are_not_those_of_a_larger_one_with_the_same_prints():
+def test_targets_of_a_small_family_are_not_those_of_a_larger_one_with_the_same_prints() -> None:
     targets = identified(scene('aicon12').image, family='aicon12,cct12')
     assert [it.family for it in targets] == ['aicon12'] * 4
     shown = scene('cct12')
@@ -181,7 +181,9 @@ def test_targets_of_a_small_family_are_not_those_of_a_larger_one_with_the_same_p
 
 
 @pytest.mark.parametrize(('rule', 'free'), [('aicon12', 'cct12'), ('aicon14', 'cct14')])
-def test_three_words_that_obey_a_rule_are_of_its_family_unless_another_one_breaks_it(rule, free):
+def test_three_words_that_obey_a_rule_are_of_its_family_unless_another_one_breaks_it(
+    rule, free
+) -> None:
     obeying = [int(word) for word in family(rule).words[[20, 50, 80]]]
     breaking = [int(word) for word in family(free).words if word not in family(rule).words][40:42]
     every = ','.join(RING_NAMES)
@@ -192,7 +194,7 @@ def test_three_words_that_obey_a_rule_are_of_its_family_unless_another_one_break
 
 
 @pytest.mark.parametrize(('name', 'radius', 'seed'), [('cct11', 7, 18), ('cct16', 16, 11)])
-def test_no_word_stands_that_a_family_found_later_explains_better(name, radius, seed):
+def test_no_word_stands_that_a_family_found_later_explains_better(name, radius, seed) -> None:
     """In the one, cct13 has words of the clearest bands, and in the other cct8."""
     wide = {'width': 1000 + 40 * radius, 'height': 700 + 30 * radius, 'targets': 12}
     light = {'light': 'stripe', 'ambient': 0.3} if name == 'cct11' else {}
@@ -201,7 +203,7 @@ def test_no_word_stands_that_a_family_found_later_explains_better(name, radius, 
     assert matches(identified(shown.image, family=','.join(RING_NAMES)), truth)
 
 
-def test_rings_of_a_data_file_are_rendered_and_identified(tmp_path):
+def test_rings_of_a_data_file_are_rendered_and_identified(tmp_path) -> None:
     file = tmp_path / 'mine.yaml'
     file.write_text('family: mine\nbits: 10\nband: [1.42, 1.87]\nwords: {changes: 6}\n')
     shown = rendered(

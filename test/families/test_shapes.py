@@ -23,17 +23,17 @@ def trapezoid(side: float, upper: float) -> np.ndarray:
         (600.0, 0.7, -0.5, 0.0),  # so near that its sides may converge
     ],
 )
-def test_small_squares_have_parallel_sides(side, upper, lowest, highest):
+def test_small_squares_have_parallel_sides(side, upper, lowest, highest) -> None:
     (odds,) = parallel_odds(square_frames(trapezoid(side, upper)[None]), 1000)
     assert lowest <= odds <= highest
 
 
-def test_a_sheared_square_is_one_that_is_tilted():
+def test_a_sheared_square_is_one_that_is_tilted() -> None:
     sheared = 30 * SQUARE @ np.array([[1, 0.2], [0.3, 0.6]])
     assert parallel_odds(square_frames(sheared[None]), 1000) == pytest.approx(0, abs=1e-6)
 
 
-def test_sharp_corners_tell_more_than_blurred_ones():
+def test_sharp_corners_tell_more_than_blurred_ones() -> None:
     dark, bright = np.zeros((1, 4)), np.ones((1, 4))
     sharp, blurred = np.full((1, 2), 3.0), np.full((1, 2), 0.3)
     assert corner_odds(dark, sharp, 12.0) == pytest.approx(6.0, abs=0.1)

@@ -44,7 +44,7 @@ def scene(family: str = FAMILY, **changes: object) -> Rendering:
     ],
 )
 @pytest.mark.parametrize('tilt', [0.0, 45.0])
-def test_markers_and_their_physical_centres(detector, family, tilt):
+def test_markers_and_their_physical_centres(detector, family, tilt) -> None:
     shown = scene(family=family, tilt=tilt, targets=4)
     made = create_detector(family=family)
     assert (made.name, made.family) == (detector, family)
@@ -54,7 +54,9 @@ def test_markers_and_their_physical_centres(detector, family, tilt):
 
 
 @pytest.mark.parametrize(('gamma', 'low', 'high'), [(1.0, 0.45, 0.65), (2.2, -0.05, 0.05)])
-def test_gamma_is_taken_out_of_the_shift_and_does_not_change_the_size(gamma, low, high, detect):
+def test_gamma_is_taken_out_of_the_shift_and_does_not_change_the_size(
+    gamma, low, high, detect
+) -> None:
     shown = scene(gamma=gamma, dot_radius=30.0, targets=2)
     true = {target.id: target for target in shown.targets}
     found = detect(shown.image)
@@ -64,7 +66,7 @@ def test_gamma_is_taken_out_of_the_shift_and_does_not_change_the_size(gamma, low
         assert target.semi_major == pytest.approx(true[target.id].semi_major, rel=0.002)
 
 
-def test_several_dictionaries_are_read_in_one_search():
+def test_several_dictionaries_are_read_in_one_search() -> None:
     for family in ('aruco_4x4_50', 'aruco_6x6_250', 'apriltag_25h9'):
         shown = scene(family=family, targets=4)
         found = create_detector(family=','.join(SQUARE_NAMES))(shown.image)
@@ -77,7 +79,7 @@ def test_several_dictionaries_are_read_in_one_search():
     assert create_detector(family='aruco_4x4_50,apriltag_36h11').name == 'square'
 
 
-def test_markers_show_their_dictionary_together():
+def test_markers_show_their_dictionary_together() -> None:
     """ID 17 has so few edges between cells that alone it may be of no dictionary of many."""
     shown = scene(targets=12, dot_radius=12.0, seed=5)
     found = create_detector(family=','.join(SQUARE_NAMES))(shown.image)
@@ -86,7 +88,7 @@ def test_markers_show_their_dictionary_together():
 
 
 @pytest.mark.parametrize(('family', 'seed'), [('aruco_4x4_50', 3), ('aruco_4x4_250', 5)])
-def test_doubtful_markers_show_their_dictionary_together(family, seed):
+def test_doubtful_markers_show_their_dictionary_together(family, seed) -> None:
     """Under these stripes no marker is sure enough to be of one dictionary of many."""
     size = {'width': 1400, 'height': 1000, 'targets': 12, 'dot_radius': 12.0}
     shown = scene(family, **size, light='stripe', ambient=0.12, seed=seed)
@@ -98,7 +100,7 @@ def test_doubtful_markers_show_their_dictionary_together(family, seed):
 
 
 @pytest.mark.parametrize('family', ['aruco_4x4_50', 'apriltag_16h5', 'aruco_5x5_50'])
-def test_a_single_marker_shows_its_dictionary(family):
+def test_a_single_marker_shows_its_dictionary(family) -> None:
     detect = create_detector(family=','.join(SQUARE_NAMES))
     evidence = 0
     for seed in range(1, 6):
@@ -109,17 +111,17 @@ def test_a_single_marker_shows_its_dictionary(family):
     assert evidence >= 2  # some IDs are nearly those of other dictionaries
 
 
-def test_hardly_any_texture_is_a_marker():
+def test_hardly_any_texture_is_a_marker() -> None:
     detect = create_detector(family=','.join(SQUARE_NAMES))
     assert sum(len(detect(textured_image(seed))) for seed in range(101, 115)) == 0
 
 
 @pytest.mark.parametrize(('family', 'seed'), [('aruco_4x4_1000', 4), ('aruco_4x4_50', 39)])
-def test_letters_are_no_markers_with_few_edges(family, seed):
+def test_letters_are_no_markers_with_few_edges(family, seed) -> None:
     assert create_detector(family=family)(textured_image(seed)) == []
 
 
-def test_letters_show_no_dictionary():
+def test_letters_show_no_dictionary() -> None:
     """Narrow 0 and 8 are ID 1023 and 975 of aruco_original."""
     page = np.full((200, 900), 220, np.uint8)
     for column in range(8):
@@ -155,13 +157,13 @@ def plate(height: int) -> np.ndarray:
 
 
 @pytest.mark.lasting
-def test_hardly_any_letter_with_round_corners_is_a_marker():
+def test_hardly_any_letter_with_round_corners_is_a_marker() -> None:
     """Of 66, four are where a quarter of the image shows no corner to be round."""
     detect = create_detector(family='aruco_original')
     assert sum(len(detect(plate(height))) for height in range(20, 101, 8)) <= 6
 
 
-def test_sides_of_letters_converge():
+def test_sides_of_letters_converge() -> None:
     """A blunt A has the cells of ID 17 of aruco_4x4_50, whose lower half is black."""
     cells = np.kron(marker(FAMILY, 17, 1), np.ones((40, 40), np.uint8)) // 255 * 170 + 50
     side = len(cells)
@@ -177,13 +179,13 @@ def test_sides_of_letters_converge():
 
 
 @pytest.mark.parametrize('seed', [8, 9])
-def test_plain_markers_show_their_dictionary_with_others(seed):
+def test_plain_markers_show_their_dictionary_with_others(seed) -> None:
     shown = scene('aruco_original', seed=seed)
     found = create_detector(family=','.join(SQUARE_NAMES))(shown.image)
     assert counted(shown, found) == (6, 0, 0)
 
 
-def test_markers_of_an_aprilgrid_touch_squares_and_have_wide_borders():
+def test_markers_of_an_aprilgrid_touch_squares_and_have_wide_borders() -> None:
     family = 'apriltag_36h11'
     cells, gap, count = 10, 3, 3
     period = cells + gap
@@ -208,7 +210,7 @@ def test_markers_of_an_aprilgrid_touch_squares_and_have_wide_borders():
     assert max(abs(it.edge_shift) for it in found) < 0.1
 
 
-def test_markers_of_ten_pixels_are_read_in_sharp_images():
+def test_markers_of_ten_pixels_are_read_in_sharp_images() -> None:
     family = 'apriltag_36h11'
     sheet = np.full((650, 900), 225, np.uint8)
     for number in range(6):
@@ -220,7 +222,7 @@ def test_markers_of_ten_pixels_are_read_in_sharp_images():
 
 
 @pytest.mark.parametrize(('family', 'least'), [('apriltag_36h11', 16), ('aruco_6x6_250', 18)])
-def test_small_markers_whose_ink_has_grown(family, least):
+def test_small_markers_whose_ink_has_grown(family, least) -> None:
     """Doubtful ones are read where their prints lie; none is one with a border of two cells."""
     size = {'width': 1600, 'height': 1200, 'targets': 20, 'dot_radius': 10 / 3, 'seed': 1}
     shown = scene(family, **size, edge_shift=0.5)
@@ -243,13 +245,13 @@ def washed_out(number: int, cell: int) -> np.ndarray:
 
 
 @pytest.mark.parametrize('cell', [6, 8, 12])
-def test_markers_whose_paper_is_washed_out(cell):
+def test_markers_whose_paper_is_washed_out(cell) -> None:
     detect = create_detector(family='apriltag_36h11')
     read = [[it.id for it in detect(washed_out(number, cell))] for number in (6, 7, 100, 300)]
     assert read == [[6], [7], [100], [300]]
 
 
-def test_not_fewer_markers_where_an_image_is_enlarged():
+def test_not_fewer_markers_where_an_image_is_enlarged() -> None:
     """What a half shows of a soft marker, a half of the half shows of one that is larger."""
     detect, read = create_detector(family='apriltag_36h11'), np.zeros(2, int)
     for seed in (2, 5, 6):
@@ -262,7 +264,7 @@ def test_not_fewer_markers_where_an_image_is_enlarged():
 
 
 @pytest.mark.parametrize('gray', [0, 90, 255])
-def test_a_covered_marker_is_read(gray):
+def test_a_covered_marker_is_read(gray) -> None:
     shown = scene(family='apriltag_36h11')
     image = shown.image.copy()
     for target in shown.targets:
@@ -271,7 +273,7 @@ def test_a_covered_marker_is_read(gray):
     assert counted(shown, create_detector(family='apriltag_36h11')(image)) == (6, 0, 0)
 
 
-def test_no_marker_less_than_apriltag_finds_and_better_centres():
+def test_no_marker_less_than_apriltag_finds_and_better_centres() -> None:
     pytest.importorskip('pupil_apriltags')
     found = readers()
     shown = scene(family='apriltag_36h11')
@@ -281,13 +283,13 @@ def test_no_marker_less_than_apriltag_finds_and_better_centres():
     assert ours.rmse[2] < theirs.rmse[2]
 
 
-def test_markers_of_another_dictionary_are_not_seen():
+def test_markers_of_another_dictionary_are_not_seen() -> None:
     shown = scene()
     assert create_detector(family='aruco_7x7_50')(shown.image) == []
 
 
 @pytest.mark.lasting
-def test_the_filter_finds_markers_that_stripes_hide(detect):
+def test_the_filter_finds_markers_that_stripes_hide(detect) -> None:
     shown = scene(light='stripe', ambient=0.1, seed=4)
     without = score(shown, detect(shown.image))
     found = identify(shown.image, detector=detect, expected_targets=6, max_evaluations=40)
@@ -297,7 +299,7 @@ def test_the_filter_finds_markers_that_stripes_hide(detect):
 
 
 @pytest.mark.parametrize('light', ['stripe', 'lattice', 'fringe'])
-def test_places_are_those_of_the_image_as_received(light, detect):
+def test_places_are_those_of_the_image_as_received(light, detect) -> None:
     shown = scene(light=light, ambient=0.3)
     found = identify(shown.image, detector=detect, expected_targets=6)
     assert counted(shown, found) == (6, 0, 0)
@@ -307,7 +309,7 @@ def test_places_are_those_of_the_image_as_received(light, detect):
         assert (other.x, other.y) == pytest.approx((one.x, one.y), abs=0.02)
 
 
-def test_corners_and_ellipse_are_those_of_the_marker(detect):
+def test_corners_and_ellipse_are_those_of_the_marker(detect) -> None:
     shown = scene()
     true = {target.id: target for target in shown.targets}
     for target in detect(shown.image):
@@ -320,7 +322,7 @@ def test_corners_and_ellipse_are_those_of_the_marker(detect):
         assert across[0] * down[1] > across[1] * down[0]  # clockwise as seen, y pointing down
 
 
-def test_what_neither_edges_nor_print_fit_states_its_error(detect):
+def test_what_neither_edges_nor_print_fit_states_its_error(detect) -> None:
     """On wavy paper contours alone tell where a marker is."""
     shown = scene(targets=16, dot_radius=12.0)
     places = np.array([(it.x, it.y) for it in shown.targets])
@@ -339,7 +341,7 @@ def test_what_neither_edges_nor_print_fit_states_its_error(detect):
     assert squares.max() < 12
 
 
-def test_what_has_no_corners_or_no_sides_stays_where_it_is(detect):
+def test_what_has_no_corners_or_no_sides_stays_where_it_is(detect) -> None:
     shown = scene()
     markers = detect(shown.image)
     others = [Target(1, 1, 50.0, 60.0, 5.0, 5.0), Target(2, 2, -900.0, 60.0, 5.0, 5.0)]
@@ -349,7 +351,7 @@ def test_what_has_no_corners_or_no_sides_stays_where_it_is(detect):
     assert detect.refine(shown.image, []) == []
 
 
-def test_any_kind_of_image(detect):
+def test_any_kind_of_image(detect) -> None:
     shown = scene()
     same = detect(shown.image)
     for image in (shown.image.astype(np.uint16) * 16, shown.image[:, ::-1][:, ::-1]):

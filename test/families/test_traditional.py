@@ -31,7 +31,7 @@ def identified(image: np.ndarray, **settings: object) -> list[Target]:
 
 
 @pytest.mark.parametrize('polarity', ['dark', 'bright'])
-def test_refinement_starts_from_what_a_filter_shows(polarity):
+def test_refinement_starts_from_what_a_filter_shows(polarity) -> None:
     shown = scene(polarity=polarity, light='stripe', ambient=1.0)
     detector = create_detector('traditional')
     filtered = HomomorphicFilter(shown.image).filtered(1.2, 0.25)
@@ -50,21 +50,21 @@ def test_refinement_starts_from_what_a_filter_shows(polarity):
     ],
     ids=['small', 'large', 'oblique'],
 )
-def test_sizes_and_views(changes):
+def test_sizes_and_views(changes) -> None:
     shown = scene(**changes)
     found = identified(shown.image)
     assert counted(shown, found) == (changes['targets'], 0, 0)
     assert score(shown, found).rmse[2] < 0.08
 
 
-def test_the_centre_is_the_physical_one_and_the_covariance_honest():
+def test_the_centre_is_the_physical_one_and_the_covariance_honest() -> None:
     shown = scene(width=2000, height=1500, targets=40, tilt=55.0, dot_radius=16.0)
     squares = relative_errors(shown, identified(shown.image))
     assert len(squares) >= 38
     assert 1 < np.mean(squares) < 4
 
 
-def test_stripes_defeat_it_and_the_filter_restores_it():
+def test_stripes_defeat_it_and_the_filter_restores_it() -> None:
     size = {'width': 1600, 'height': 1200, 'targets': 12, 'seed': 1}
     shown = rendering(**size, light='stripe', ambient=0.3)
     assert score(shown, identified(shown.image)).right <= 4
@@ -73,7 +73,7 @@ def test_stripes_defeat_it_and_the_filter_restores_it():
 
 
 @pytest.mark.parametrize('light', ['stripe', 'lattice'])
-def test_small_targets_in_deep_shadow_are_read_through_a_filter(light):
+def test_small_targets_in_deep_shadow_are_read_through_a_filter(light) -> None:
     shown = rendering(
         width=1600, height=1066, targets=24, dot_radius=10, light=light, ambient=0.12
     )
@@ -85,7 +85,7 @@ def test_small_targets_in_deep_shadow_are_read_through_a_filter(light):
     assert (wrong, false) == (0, 0)
 
 
-def test_targets_are_of_one_colour_that_of_most():
+def test_targets_are_of_one_colour_that_of_most() -> None:
     """Bright spots between shadows look like bright targets."""
     dark, bright = scene(targets=4), scene(targets=2, polarity='bright', seed=5)
     both = np.hstack([dark.image, bright.image])
@@ -98,11 +98,11 @@ def test_targets_are_of_one_colour_that_of_most():
     'settings',
     [{'polarity': 'bright'}, {'min_radius': 12.0}, {'max_radius': 8.0}, {'family': 'metashape14'}],
 )
-def test_what_is_not_asked_for_is_not_reported(settings):
+def test_what_is_not_asked_for_is_not_reported(settings) -> None:
     assert identified(scene().image, **settings) == []
 
 
-def test_dots_without_a_code_are_reported_on_request():
+def test_dots_without_a_code_are_reported_on_request() -> None:
     image = np.full((200, 300), 220, np.uint8)
     cv2.circle(image, (90, 100), 10, 30, -1)
     cv2.circle(image, (210, 100), 10, 30, -1)
@@ -114,13 +114,13 @@ def test_dots_without_a_code_are_reported_on_request():
     assert (right.x, right.y) == pytest.approx((210, 100), abs=0.05)
 
 
-def test_sectors_of_a_decoded_target_are_not_reported():
+def test_sectors_of_a_decoded_target_are_not_reported() -> None:
     shown = scene(dot_radius=14.0, targets=4)
     found = identified(shown.image, report_undecoded=True)
     assert [target.id for target in found] == [target.id for target in shown.targets]
 
 
-def test_an_id_is_reported_once():
+def test_an_id_is_reported_once() -> None:
     shown = scene()
     twice = np.hstack([shown.image, shown.image])
     ids = [target.id for target in identified(twice)]
@@ -129,14 +129,14 @@ def test_an_id_is_reported_once():
     assert [target.id for target in found] == [UNDECODED] * 6 + ids
 
 
-def test_a_target_cut_by_the_frame_is_not_decoded():
+def test_a_target_cut_by_the_frame_is_not_decoded() -> None:
     shown = scene()
     cut = min(shown.targets, key=lambda target: target.x)
     image = shown.image[:, round(cut.x - 2.5 * cut.semi_major) :]
     assert cut.id not in {target.id for target in identified(image)}
 
 
-def test_noise_shows_no_targets():
+def test_noise_shows_no_targets() -> None:
     noise = np.random.default_rng(0).integers(0, 256, (600, 800)).astype(np.uint8)
     assert identified(noise[:16, :16]) == []  # the smallest image
     assert identified(noise, report_undecoded=True) == []
@@ -144,7 +144,7 @@ def test_noise_shows_no_targets():
 
 
 @needs_photographs
-def test_a_real_panel():
+def test_a_real_panel() -> None:
     truth = read_truth(PANEL / 'truth.csv')['043_0021.png']
     image = read_image(PANEL / '043_0021.png')
     figures = score(truth, identified(image, family='aicon14'))

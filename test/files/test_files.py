@@ -67,7 +67,7 @@ def test_a_device_is_written_to_and_stays_one() -> None:
     assert Path('/dev/null').is_char_device() and Path('/dev/full').is_char_device()
 
 
-def test_tables_hold_no_formula_and_read_back(tmp_path):
+def test_tables_hold_no_formula_and_read_back(tmp_path: Path) -> None:
     names = ['=1+1', '+a', '-a', '@a', "'=1", "''-x", "'a", 'a=', '-1.5', '+2', 'a,b', '']
     path = tmp_path / 'table.csv'
     path.write_bytes(csv_table([('id', 'x'), *((name, '-0.25') for name in names)]))

@@ -6,6 +6,7 @@ import struct
 import sys
 import zlib
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -35,7 +36,7 @@ ORIENTATIONS = range(1, 9)
         *((suffix, GRAY * 100) for suffix in ('.png', '.tif')),
     ],
 )
-def test_what_is_written_is_read(tmp_path, suffix, image):
+def test_what_is_written_is_read(tmp_path: Path, suffix: Any, image: Any) -> None:
     file = tmp_path / 'deep' / f'Prüfkörper{suffix}'
     write_image(file, image)
     read = read_image(file)
@@ -45,7 +46,7 @@ def test_what_is_written_is_read(tmp_path, suffix, image):
 
 @pytest.mark.parametrize('suffix', ['.jpg', '.jpeg', '.png'])
 @pytest.mark.parametrize('channels', [3, 4])
-def test_colour_turns_to_gray(tmp_path, suffix, channels):
+def test_colour_turns_to_gray(tmp_path: Path, suffix: str, channels: int) -> None:
     colour = np.full((20, 30, channels), (200, 100, 50, 7)[:channels], np.uint8)
     write_image(tmp_path / f'image{suffix}', colour)
     read = read_image(str(tmp_path / f'image{suffix}'))
@@ -54,13 +55,13 @@ def test_colour_turns_to_gray(tmp_path, suffix, channels):
     np.testing.assert_allclose(read, luma, atol=2)
 
 
-def test_float_images_keep_their_values(tmp_path):
+def test_float_images_keep_their_values(tmp_path: Path) -> None:
     image = GRAY.astype(np.float32) / 7
     cv2.imwrite(str(tmp_path / 'image.tif'), image)
     np.testing.assert_array_equal(read_image(tmp_path / 'image.tif'), image)
 
 
-def test_files_that_are_no_images_are_named(tmp_path):
+def test_files_that_are_no_images_are_named(tmp_path: Path) -> None:
     (tmp_path / 'empty.png').touch()
     (tmp_path / 'text.png').write_text('not an image')
     for name, words in [
@@ -74,7 +75,7 @@ def test_files_that_are_no_images_are_named(tmp_path):
         assert str(tmp_path / name) in str(caught.value)
 
 
-def test_images_that_cannot_be_written_are_named(tmp_path):
+def test_images_that_cannot_be_written_are_named(tmp_path: Path) -> None:
     with pytest.raises(
         ValueError, match=r'image.xyz has an unknown format, accepted is one of .bmp'
     ):
@@ -136,7 +137,9 @@ def header_of(content: bytes) -> tuple[int, int, int]:
 @pytest.mark.parametrize('orientation', ORIENTATIONS)
 @pytest.mark.parametrize('order', ['<', '>'])
 @pytest.mark.parametrize('pixels', [GRAY, DARK, np.dstack([DARK] * 3)], ids=['16', '8', 'colour'])
-def test_pixels_of_tiff_are_those_that_are_stored(orientation, order, pixels):
+def test_pixels_of_tiff_are_those_that_are_stored(
+    orientation: int, order: str, pixels: Any
+) -> None:
     content = tiff(pixels, orientation, order)
     stored = pixels if pixels.ndim == 2 else pixels[:, :, 0]
     np.testing.assert_array_equal(decode_bytes(content, 'image').image, stored)
@@ -145,14 +148,14 @@ def test_pixels_of_tiff_are_those_that_are_stored(orientation, order, pixels):
 
 @pytest.mark.parametrize('orientation', ORIENTATIONS)
 @pytest.mark.parametrize('suffix', ['.jpg', '.png'])
-def test_pixels_of_other_formats_are_those_that_are_stored(orientation, suffix):
+def test_pixels_of_other_formats_are_those_that_are_stored(orientation: int, suffix: str) -> None:
     content = with_exif(suffix, DARK, orientation)
     plain = cv2.imdecode(cv2.imencode(suffix, DARK)[1], cv2.IMREAD_GRAYSCALE)
     np.testing.assert_array_equal(decode_bytes(content, 'image').image, plain)
     assert header_of(content) == (30, 20, orientation)
 
 
-def test_the_orientation_is_reported(tmp_path: Path, capfd: pytest.CaptureFixture[str]):
+def test_the_orientation_is_reported(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     path = tmp_path / 'turned.tif'
     path.write_bytes(tiff(GRAY, 6))
     assert read_noted_image(path).note.startswith(f'{path}: orientation 6 is not applied')
@@ -165,8 +168,8 @@ def test_the_orientation_is_reported(tmp_path: Path, capfd: pytest.CaptureFixtur
 
 @pytest.mark.parametrize('suffix', ['.png', '.jpg', '.bmp', '.tif'])
 def test_images_that_are_too_large_are_named_before_they_are_decoded(
-    suffix, monkeypatch, tmp_path
-):
+    suffix: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
     wide = np.zeros((16, 40_000), np.uint8)
     (tmp_path / f'wide{suffix}').write_bytes(cv2.imencode(suffix, wide)[1].tobytes())
     monkeypatch.setattr(cv2, 'imdecode', None)
@@ -175,14 +178,14 @@ def test_images_that_are_too_large_are_named_before_they_are_decoded(
         read_image(tmp_path / f'wide{suffix}')
 
 
-def test_a_bomb_is_named(tmp_path):
+def test_a_bomb_is_named(tmp_path: Path) -> None:
     content = bytearray(cv2.imencode('.png', np.zeros((20, 20), np.uint8))[1].tobytes())
     content[16:24] = struct.pack('>LL', 32_000, 32_000)
     with pytest.raises(ValueError, match='is 32000 x 32000 px, accepted are'):
         decode_bytes(content, 'bomb')
 
 
-def test_damaged_headers_are_no_error():
+def test_damaged_headers_are_no_error() -> None:
     assert read_header(b'II+\0' + struct.pack('<HHQ', 8, 0, 2**64 - 1)) == read_header(b'')
     whole = [tiff(GRAY, 6), with_exif('.jpg', DARK, 3)]
     random = np.random.default_rng(0)
@@ -230,7 +233,7 @@ def page(width: int, height: int, reduced: int = 0, colours: int = 1, **more: in
 
 @pytest.mark.parametrize('order', '<>')
 @pytest.mark.parametrize('parts', [0, 1])
-def test_the_image_of_full_size_is_read_wherever_it_is(order, parts):
+def test_the_image_of_full_size_is_read_wherever_it_is(order: Any, parts: int) -> None:
     content = paged(page(25, 20, 1), page(50, 40, orientation=6), parts=parts, order=order)
     noted = decode_bytes(content, 'a.tif')
     assert noted.image.shape == (40, 50)
@@ -240,14 +243,14 @@ def test_the_image_of_full_size_is_read_wherever_it_is(order, parts):
     assert (header.width, header.height, header.pages) == (50, 40, 1)
 
 
-def test_the_size_of_a_photograph_is_that_of_its_full_image(tmp_path):
+def test_the_size_of_a_photograph_is_that_of_its_full_image(tmp_path: Path) -> None:
     pytest.importorskip('PIL')
     path = tmp_path / 'a.tif'
     path.write_bytes(paged(page(25, 20, 1), page(50, 40)))
     assert read_exif(path)[1] == (50, 40)
 
 
-def test_pages_and_raw_images_are_named():
+def test_pages_and_raw_images_are_named() -> None:
     noted = decode_bytes(paged(page(50, 40), page(50, 40), page(50, 40)), 'a.tif')
     assert noted.note == 'a.tif has 3 pages, the first is read'
     assert noted.image[0, 0] == 0
@@ -268,14 +271,16 @@ def test_pages_and_raw_images_are_named():
         (b'FUJIFILMCCD-RAW 0201', 'a raw image'),
     ],
 )
-def test_formats_of_cameras_that_are_not_read_are_named(begin, kind, monkeypatch):
+def test_formats_of_cameras_that_are_not_read_are_named(
+    begin: bytes, kind: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setitem(sys.modules, 'pillow_heif', None)
     with pytest.raises(ValueError, match=rf'a is {kind}, accepted is .*convert it in full size'):
         decode_bytes(begin + bytes(100), 'a')
 
 
 @pytest.mark.parametrize('prefix', [b'', b'Exif\0\0'])
-def test_the_orientation_of_webp_is_that_of_its_exif(tmp_path, prefix):
+def test_the_orientation_of_webp_is_that_of_its_exif(tmp_path: Path, prefix: bytes) -> None:
     _, encoded = cv2.imencode('.webp', DARK)
     exif = prefix + b'MM\0*\0\0\0\x08\0\1\1\x12\0\3\0\0\0\1\0\6\0\0\0\0\0\0'
     sides = (DARK.shape[1] - 1).to_bytes(3, 'little') + (DARK.shape[0] - 1).to_bytes(3, 'little')
@@ -288,7 +293,7 @@ def test_the_orientation_of_webp_is_that_of_its_exif(tmp_path, prefix):
     assert read_image(path, upright=True).shape == DARK.shape[::-1]
 
 
-def test_missing_pixels_of_floats_are_0(tmp_path):
+def test_missing_pixels_of_floats_are_0(tmp_path: Path) -> None:
     image = 1 + DARK.astype(np.float32)
     image[3, 4:7] = np.nan, np.inf, -np.inf
     cv2.imwrite(str(tmp_path / 'a.tif'), image)
@@ -299,7 +304,9 @@ def test_missing_pixels_of_floats_are_0(tmp_path):
     assert np.isnan(read_image(tmp_path / 'a.tif')).all()  # for whoever checks images
 
 
-def test_what_is_left_out_of_a_folder_is_counted_by_kind(tmp_path, monkeypatch):
+def test_what_is_left_out_of_a_folder_is_counted_by_kind(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setitem(sys.modules, 'pillow_heif', None)
     for name in ('a.png', 'a.HEIC', 'b.heic', 'c.cr2', 'list'):
         (tmp_path / name).touch()

@@ -31,7 +31,9 @@ COLOURS = np.dstack([GRAY, GRAY[::-1], 255 - GRAY])  # blue, green, red
 NATIVE = sys.byteorder == 'big'
 
 
-def message(encoding: str, pixels: np.ndarray, big: bool = NATIVE, padding: int = 0, **changes):
+def message(
+    encoding: str, pixels: np.ndarray, big: bool = NATIVE, padding: int = 0, **changes: Any
+) -> SimpleNamespace:
     """Return a message as it is duck-typed: pixels of shape (height, width, ...)."""
     height, width = pixels.shape[:2]
     sent = pixels.astype(pixels.dtype.newbyteorder('>' if big else '<'))
@@ -61,7 +63,9 @@ def message(encoding: str, pixels: np.ndarray, big: bool = NATIVE, padding: int 
         ('64FC1', np.float64),
     ],
 )
-def test_gray_keeps_its_values_and_its_type_without_a_copy(encoding, kind, padding, big):
+def test_gray_keeps_its_values_and_its_type_without_a_copy(
+    encoding: str, kind: Any, padding: int, big: bool
+) -> None:
     pixels = GRAY.astype(kind) * (37 if kind != np.uint8 else 1)
     sent = message(encoding, pixels, big, padding)
     image = decode_image(sent)
@@ -74,7 +78,7 @@ def test_gray_keeps_its_values_and_its_type_without_a_copy(encoding, kind, paddi
 @pytest.mark.parametrize('big', [False, True])
 @pytest.mark.parametrize('bits', [8, 16])
 @pytest.mark.parametrize('order', ['rgb', 'bgr', 'rgba', 'bgra'])
-def test_colours_are_weighted(order, bits, big):
+def test_colours_are_weighted(order: str, bits: int, big: bool) -> None:
     scale, kind = {8: (1, np.uint8), 16: (257, np.uint16)}[bits]
     channels = {'b': 0, 'g': 1, 'r': 2}
     planes = [COLOURS[..., channels[name]] if name != 'a' else 0 * GRAY for name in order]
@@ -85,7 +89,7 @@ def test_colours_are_weighted(order, bits, big):
 
 
 @pytest.mark.parametrize('kind', ['8U', '16U', '32F', '64F'])
-def test_channels_without_a_name(kind):
+def test_channels_without_a_name(kind: str) -> None:
     dtype = {'8U': 'u1', '16U': 'u2', '32F': 'f4', '64F': 'f8'}[kind]
     expected = COLOURS @ [0.114, 0.587, 0.299]
     for samples in (3, 4):
@@ -99,7 +103,7 @@ def test_channels_without_a_name(kind):
 
 @pytest.mark.parametrize('bits', [8, 16])
 @pytest.mark.parametrize('pattern', ['rggb', 'bggr', 'gbrg', 'grbg'])
-def test_bayer_patterns_show_the_colour_that_they_are_of(pattern, bits):
+def test_bayer_patterns_show_the_colour_that_they_are_of(pattern: str, bits: int) -> None:
     """Only the red cells of an even red light are bright: 0.299 of white in every pixel."""
     kind, white = {8: (np.uint8, 200), 16: (np.uint16, 50000)}[bits]
     cell = np.array([of == 'r' for of in pattern]).reshape(2, 2) * white
@@ -122,12 +126,12 @@ NEUTRAL = np.full((12, 10), 128, np.uint8)
         ('nv24', np.concatenate([GRAY, NEUTRAL])),
     ],
 )
-def test_brightness_of_yuv_beside_and_before_the_colours(encoding, pixels):
+def test_brightness_of_yuv_beside_and_before_the_colours(encoding: Any, pixels: Any) -> None:
     sent = message(encoding, pixels, padding=3, height=len(GRAY))
     assert np.array_equal(decode_image(sent), GRAY)
 
 
-def test_pixels_without_a_value_are_black():
+def test_pixels_without_a_value_are_black() -> None:
     pixels = GRAY.astype(np.float32)
     pixels[2, 3], pixels[0, 0] = np.nan, np.inf
     image = decode_image(message('32FC1', pixels))
@@ -138,7 +142,7 @@ def test_pixels_without_a_value_are_black():
 
 
 @pytest.mark.parametrize('encoding', ['8SC1', '16SC1', '32SC1', 'compressedDepth', '', 'MONO8'])
-def test_encodings_that_hold_no_image_are_named(encoding):
+def test_encodings_that_hold_no_image_are_named(encoding: str) -> None:
     with pytest.raises(ValueError, match=f"encoding is '{encoding}', accepted is one of mono8"):
         decode_image(message(encoding, GRAY))
 
@@ -159,13 +163,13 @@ def test_encodings_that_hold_no_image_are_named(encoding):
         ),
     ],
 )
-def test_a_header_that_does_not_fit_the_data_is_named(fields, error):
+def test_a_header_that_does_not_fit_the_data_is_named(fields: Any, error: str) -> None:
     fitting = message('mono8', GRAY)
     with pytest.raises(ValueError, match=error):
         decode_image(SimpleNamespace(**vars(fitting) | fields))
 
 
-def test_data_that_is_longer_than_its_rows_is_named_but_for_planes_of_colour():
+def test_data_that_is_longer_than_its_rows_is_named_but_for_planes_of_colour() -> None:
     long = message('mono8', GRAY)
     rows, step = long.height, long.step
     long.data = np.concatenate([np.asarray(long.data), np.zeros(4, np.uint8)])
@@ -207,7 +211,7 @@ def with_holes(image: np.ndarray) -> np.ndarray:
         ('rgb8', np.dstack([SCENE.image] * 3)),
     ],
 )
-def test_targets_are_identified_in_what_scanners_publish(encoding, pixels):
+def test_targets_are_identified_in_what_scanners_publish(encoding: str, pixels: Any) -> None:
     sent = message(encoding, pixels, padding=16)
     assert [
         target.id for target in create_detector('ring', family='metashape12')(decode_image(sent))
@@ -215,7 +219,7 @@ def test_targets_are_identified_in_what_scanners_publish(encoding, pixels):
 
 
 @pytest.mark.parametrize('depth', [9, 10, 12, 16])
-def test_few_used_bits_make_the_same_gray_values(depth):
+def test_few_used_bits_make_the_same_gray_values(depth: int) -> None:
     """An image needs 100000 pixels before one of them may be hot."""
     image = (SCENE.image.astype(np.uint16) + 1) << (depth - 8)
     gray = as_gray(with_hot_pixel(image, 2**depth - 1))
@@ -226,7 +230,7 @@ def test_few_used_bits_make_the_same_gray_values(depth):
     assert error.max() < 0.02
 
 
-def test_compressed_images_keep_their_depth():
+def test_compressed_images_keep_their_depth() -> None:
     for image in (GRAY, GRAY.astype(np.uint16) * 200):
         _, data = cv2.imencode('.png', image)
         told = SimpleNamespace(format='mono16; png compressed', data=data.ravel())
@@ -260,7 +264,7 @@ def attempt(decode: Callable[[Any], np.ndarray], fields: Fields) -> np.ndarray |
 
 
 @given(IMAGES)
-def test_any_message_is_an_image_or_refused(fields):
+def test_any_message_is_an_image_or_refused(fields: Any) -> None:
     image = attempt(decode_image, fields)
     if image is None:
         return
@@ -292,7 +296,7 @@ def compressed_images(draw: st.DrawFn) -> Fields:
 
 
 @given(compressed_images())
-def test_any_compressed_message_is_an_image_or_refused(fields):
+def test_any_compressed_message_is_an_image_or_refused(fields: Any) -> None:
     attempt(lambda message: decode_compressed(message).image, fields)
 
 

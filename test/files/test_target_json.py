@@ -5,6 +5,8 @@ from __future__ import annotations
 import io
 import json
 import math
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -28,7 +30,7 @@ CLOCKWISE = np.array([(np.cos(it), np.sin(it)) for it in np.radians(np.arange(0,
 NONE = (0.0, 0.0, 0.0, 0.0)
 
 
-def test_what_becomes_json_is_read_again():
+def test_what_becomes_json_is_read_again() -> None:
     covariance = (0.1, 0.01, 0.01, 0.2)
     target = Target(7, 19, 1.25, 2.5, 20.0, 18.0, 0.3, 0.9, covariance, 'aicon14', edge_shift=-0.5)
     state = FilterState(True, 2.0, 0.5, 80.0, 1.5, 9, 1, 0.25)
@@ -88,7 +90,7 @@ def test_low_confidences_are_explained() -> None:
     assert items[1]['doubt'] == 'mine sets a lower limit of its own'
 
 
-def test_searches_and_the_reasons_of_undecoded_targets_become_json():
+def test_searches_and_the_reasons_of_undecoded_targets_become_json() -> None:
     dots = ((1.0, 2.0, 3.0, 2.5, 0.1), (9.0, 2.0, 3.0, 2.5, 0.1))
     targets = (
         UndecodedTarget(-1, 0, 5.0, 6.0, 2.0, 1.0, 0.0, 0.4, NONE, '', 'uncertain', 17, 'aicon14'),
@@ -120,13 +122,13 @@ def test_searches_and_the_reasons_of_undecoded_targets_become_json():
         ({'dots': [[1, 2, 3, 4, 5]], 'template_dots': 2}, 'template_dots is 2'),
     ],
 )
-def test_a_damaged_kind_of_target_is_named(change, message):
+def test_a_damaged_kind_of_target_is_named(change: Any, message: str) -> None:
     item = {'id': 1, 'x': 2.0, 'y': 3.0, **change}
     with pytest.raises(ValueError, match=message):
         targets_from_json({'targets': [item]}, 'record')
 
 
-def test_results_need_only_ids_and_places(tmp_path):
+def test_results_need_only_ids_and_places(tmp_path: Path) -> None:
     lines = [
         json.dumps({'image': 'in/a.png', 'targets': [{'id': 4, 'x': 1.5, 'y': 2}]}),
         '',
@@ -140,13 +142,15 @@ def test_results_need_only_ids_and_places(tmp_path):
     assert target.family == ''
 
 
-def test_results_from_standard_input(monkeypatch):
+def test_results_from_standard_input(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr('sys.stdin', io.StringIO('{"image": "a.png", "targets": []}\n'))
     assert read_results('-') == {'a.png': ()}
 
 
 @pytest.mark.parametrize('given', [None, io.TextIOWrapper(io.BytesIO(b'\xff'), 'utf-8')])
-def test_standard_input_that_is_closed_or_no_text_is_named(monkeypatch, given):
+def test_standard_input_that_is_closed_or_no_text_is_named(
+    monkeypatch: pytest.MonkeyPatch, given: Any
+) -> None:
     monkeypatch.setattr('sys.stdin', given)
     with pytest.raises(ValueError, match=r'^- cannot be read: '):
         read_results('-')
@@ -177,7 +181,7 @@ def result(*targets: str) -> str:
         (f'{result()}\n{{"image": "b/a", "targets": []}}', 'line 2: a was on'),
     ],
 )
-def test_results_that_cannot_be_used_are_named(tmp_path, text, message):
+def test_results_that_cannot_be_used_are_named(tmp_path: Path, text: Any, message: str) -> None:
     (tmp_path / 'results.jsonl').write_text(text)
     with pytest.raises(ValueError, match=message) as caught:
         read_results(tmp_path / 'results.jsonl')

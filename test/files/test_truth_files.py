@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
 from ahf_ros.base.target import TrueTarget
 from ahf_ros.files.truth_files import read_truth, write_truth
 
 
-def test_truth_that_is_written_is_read(tmp_path):
+def test_truth_that_is_written_is_read(tmp_path: Path) -> None:
     truth = {
         'a.png': (TrueTarget(3, 1.25, 2.5), TrueTarget(7, 100.1234, 3.0, confirmed=False)),
         'b.png': (TrueTarget(1, 0.0, 0.0),),
@@ -17,7 +19,7 @@ def test_truth_that_is_written_is_read(tmp_path):
     assert read_truth(tmp_path / 'truth.csv') == truth
 
 
-def test_truth_in_another_order_with_folders_and_no_confirmed(tmp_path):
+def test_truth_in_another_order_with_folders_and_no_confirmed(tmp_path: Path) -> None:
     (tmp_path / 'truth.csv').write_text('\ufeffid,y,x,image,note\n5,2,1,in/a.png,?\n', 'utf-8')
     assert read_truth(tmp_path / 'truth.csv') == {'a.png': (TrueTarget(5, 1.0, 2.0),)}
 
@@ -43,7 +45,7 @@ def test_truth_in_another_order_with_folders_and_no_confirmed(tmp_path):
         (f'image,id,x,y,{"x" * 200_000}\n', 'line 1: field larger than field limit'),
     ],
 )
-def test_truth_that_cannot_be_used_is_named(tmp_path, text, message):
+def test_truth_that_cannot_be_used_is_named(tmp_path: Path, text: str, message: str) -> None:
     (tmp_path / 'truth.csv').write_text(text)
     with pytest.raises(ValueError, match=message) as caught:
         read_truth(tmp_path / 'truth.csv')
@@ -51,7 +53,7 @@ def test_truth_that_cannot_be_used_is_named(tmp_path, text, message):
     assert len(str(caught.value)) < 1000
 
 
-def test_truth_that_is_no_text_is_named(tmp_path):
+def test_truth_that_is_no_text_is_named(tmp_path: Path) -> None:
     (tmp_path / 'image.png').write_bytes(b'\x89PNG\r\n\xff')
     with pytest.raises(ValueError, match=r'image.png is not a text'):
         read_truth(tmp_path / 'image.png')

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import struct
 from threading import Thread
+from typing import Any
 
 import cv2
 import numpy as np
@@ -45,7 +46,7 @@ def strips_first(pixels: np.ndarray, rows: int) -> bytes:
 
 
 @pytest.mark.parametrize('parameters', JPEG_KINDS)
-def test_a_jpeg_that_is_cut_or_has_a_hole_is_damaged(parameters):
+def test_a_jpeg_that_is_cut_or_has_a_hole_is_damaged(parameters: Any) -> None:
     whole = encoded('.jpg', *parameters)
     middle = len(whole) // 2
     assert damage(whole) == decoded_damage(whole) == ''
@@ -60,7 +61,7 @@ def test_a_jpeg_that_is_cut_or_has_a_hole_is_damaged(parameters):
         assert 'Corrupt JPEG data' in decoded_damage(hole)
 
 
-def test_what_cameras_add_to_a_jpeg_is_no_damage():
+def test_what_cameras_add_to_a_jpeg_is_no_damage() -> None:
     whole = encoded('.jpg')
     thumbnail = cv2.imencode('.jpg', SMOOTH[:60, :80])[1].tobytes()
     exif = b'\xff\xe1' + struct.pack('>H', 8 + len(thumbnail)) + b'Exif\0\0' + thumbnail
@@ -74,7 +75,7 @@ def test_what_cameras_add_to_a_jpeg_is_no_damage():
         assert decoded_damage(good) == ''
 
 
-def test_a_tiff_whose_strips_are_not_in_the_file_is_damaged():
+def test_a_tiff_whose_strips_are_not_in_the_file_is_damaged() -> None:
     whole = strips_first(SMOOTH, 16)
     assert np.array_equal(decoded(np.frombuffer(whole, np.uint8), FLAGS)[0], SMOOTH)
     assert damage(whole) == decoded_damage(whole) == ''
@@ -85,7 +86,7 @@ def test_a_tiff_whose_strips_are_not_in_the_file_is_damaged():
 
 @pytest.mark.skipif(OLD, reason='OpenCV before 4.7 does not say it')
 @pytest.mark.parametrize('compression', [5, 8])
-def test_a_tiff_with_a_hole_is_damaged(compression):
+def test_a_tiff_with_a_hole_is_damaged(compression: int) -> None:
     whole = encoded('.tif', cv2.IMWRITE_TIFF_COMPRESSION, compression)
     middle = len(whole) // 2
     hole = whole[:middle] + bytes(1000) + whole[middle + 1000 :]
@@ -94,7 +95,7 @@ def test_a_tiff_with_a_hole_is_damaged(compression):
     assert image is None or 'TIFF_Error' in missing  # some versions of OpenCV refuse it
 
 
-def test_a_png_has_its_checksums_and_its_end():
+def test_a_png_has_its_checksums_and_its_end() -> None:
     whole = encoded('.png')
     middle = len(whole) // 2
     changed = whole[:middle] + bytes([whole[middle] ^ 1]) + whole[middle + 1 :]
@@ -103,7 +104,7 @@ def test_a_png_has_its_checksums_and_its_end():
     assert damage(whole[:middle]) == 'its structure is cut or damaged'
 
 
-def test_others_may_write_to_standard_error_meanwhile(capfd):
+def test_others_may_write_to_standard_error_meanwhile(capfd: pytest.CaptureFixture[str]) -> None:
     whole = encoded('.jpg')  # of which the decoder says nothing itself
     lines = [f'line {number}' for number in range(2000)]
 
@@ -120,7 +121,7 @@ def test_others_may_write_to_standard_error_meanwhile(capfd):
     assert sorted(capfd.readouterr().err.splitlines()) == sorted(lines)
 
 
-def test_chunks_of_png_that_say_they_are_huge_take_no_memory():
+def test_chunks_of_png_that_say_they_are_huge_take_no_memory() -> None:
     """Decoders take it, 4 GB, before they look for the content."""
     content = bytearray(encoded('.png'))
     place = content.index(b'IDAT') - 4

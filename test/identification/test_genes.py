@@ -1,4 +1,5 @@
 from dataclasses import astuple
+from typing import Any
 
 import numpy as np
 import pytest
@@ -19,14 +20,14 @@ from support.fourier import filtered_logarithm_fft
 SHAPE = (48, 64)
 
 
-def test_the_published_search_tunes_the_gains_of_the_paper():
+def test_the_published_search_tunes_the_gains_of_the_paper() -> None:
     high, low = genes_of(TuningSettings(search=PUBLISHED))
     assert (high.count, high.bits, high.value(0), high.value(30)) == (31, 5, 1.0, 4.0)
     assert (low.count, low.bits, low.value(0), low.value(100)) == (101, 7, 0.0, 1.0)
     assert tuned(SHAPE, (2.8, 0.82)) == transfer(SHAPE, 2.8, 0.82)
 
 
-def test_an_extended_search_also_tunes_cutoff_and_exponent():
+def test_an_extended_search_also_tunes_cutoff_and_exponent() -> None:
     settings = TuningSettings(search=EXTENDED, cutoff_min=0.25, cutoff_max=2, exponent_min=0.3)
     *gains, cutoff, exponent = genes_of(settings)
     assert tuple(gains) == genes_of(TuningSettings(search=PUBLISHED))
@@ -40,7 +41,7 @@ def test_an_extended_search_also_tunes_cutoff_and_exponent():
     assert tuned(SHAPE, (1.0, 1.0, -1.0, -2.0)).attenuation == 0
 
 
-def test_an_exponent_is_a_power_of_the_filtered_image():
+def test_an_exponent_is_a_power_of_the_filtered_image() -> None:
     image = np.random.default_rng(1).integers(20, 255, SHAPE).astype(np.uint8)
     whole, root = (
         filtered_logarithm_fft(image, *astuple(tuned(SHAPE, (2.0, 0.5, -0.5, exponent))))
@@ -71,7 +72,9 @@ def test_an_exponent_is_a_power_of_the_filtered_image():
         ({'exponent_min': 0.0}, 'exponent_min is 0.0, accepted is a number from 0.01'),
     ],
 )
-def test_a_range_that_makes_no_sense_is_refused(values, words):
+def test_a_range_that_makes_no_sense_is_refused(
+    values: dict[str, float] | dict[str, str], words: str
+) -> None:
     with pytest.raises(ValueError, match=words):
         TuningSettings(**values)
 
@@ -97,12 +100,12 @@ def test_a_range_that_makes_no_sense_is_refused(values, words):
         (GeneticSettings, 'seed', -1),
     ],
 )
-def test_a_setting_out_of_range_is_refused(settings, name, value):
+def test_a_setting_out_of_range_is_refused(settings: Any, name: str, value: float) -> None:
     with pytest.raises(ValueError, match=f'^{name} is {value}, accepted is'):
         settings(**{name: value})
 
 
-def test_the_first_filters_are_chromosomes_far_apart():
+def test_the_first_filters_are_chromosomes_far_apart() -> None:
     genes = genes_of(TuningSettings())
     for values in FIRST:
         assert np.allclose(decoded(np.array(encoded(values, genes)), genes), values)

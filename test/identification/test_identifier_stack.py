@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -33,7 +35,7 @@ class Liking:
 
 
 @pytest.mark.parametrize('name', COMBINATIONS)
-def test_the_first_combination_that_shows_n_is_chosen_before_any_search(name):
+def test_the_first_combination_that_shows_n_is_chosen_before_any_search(name: Any) -> None:
     detector = Liking(name)
     identifier = Identifier(detector, SHORT, expected_targets=5)
     found = identifier.identify(STACK)
@@ -44,13 +46,13 @@ def test_the_first_combination_that_shows_n_is_chosen_before_any_search(name):
     assert (again.combination, again.filter.evaluations) == (name, 1)
 
 
-def test_without_n_the_most_promising_combination_is_looked_at_alone():
+def test_without_n_the_most_promising_combination_is_looked_at_alone() -> None:
     detector = Liking('mean_gray')
     found = Identifier(detector).identify(STACK)
     assert (found.combination, found.count, len(detector.images)) == (COMBINATIONS[0], 2, 1)
 
 
-def test_the_combination_is_a_gene_of_the_search():
+def test_the_combination_is_a_gene_of_the_search() -> None:
     def detector(image: np.ndarray) -> list[Target]:
         plain = any(np.array_equal(image, STACK.combined(name)) for name in COMBINATIONS)
         return targets(2 if plain else 4)
@@ -68,7 +70,7 @@ def test_the_combination_is_a_gene_of_the_search():
     assert found.filter.evaluations == 40 + len(COMBINATIONS)
 
 
-def test_a_result_does_not_depend_on_threads():
+def test_a_result_does_not_depend_on_threads() -> None:
     def identified(threads: int) -> object:
         settings = AdaptiveSettings(threads=threads, genetic=SHORT.genetic)
         found = Identifier(
@@ -80,7 +82,7 @@ def test_a_result_does_not_depend_on_threads():
 
 
 @pytest.mark.parametrize('kind', [np.uint8, np.uint16, np.float32])
-def test_a_stack_of_one_image_is_that_image(kind):
+def test_a_stack_of_one_image_is_that_image(kind: Any) -> None:
     image = IMAGES[0].astype(kind)
     results = []
     for received in (image, ImageStack((image,))):
@@ -93,7 +95,7 @@ def test_a_stack_of_one_image_is_that_image(kind):
     assert results[0][1] == ''
 
 
-def test_refinement_gets_the_combination_that_was_chosen():
+def test_refinement_gets_the_combination_that_was_chosen() -> None:
     seen: list[np.ndarray] = []
     stack = ImageStack(tuple(image.astype(np.uint16) for image in IMAGES))
 
@@ -109,19 +111,19 @@ def test_refinement_gets_the_combination_that_was_chosen():
 
 @pytest.mark.parametrize('memory', [(2.0, 0.5, 0.0, 0.0), (1.0,), (2.0, 0.5, 0.0, 0.0, 1.0)])
 @pytest.mark.parametrize('received', [IMAGES[0], STACK])
-def test_what_worked_for_other_images_is_no_obstacle(memory, received):
+def test_what_worked_for_other_images_is_no_obstacle(memory: Any, received: Any) -> None:
     identifier = Identifier(lambda image: targets(3), expected_targets=3)
     identifier.memory = Memory(memory)
     assert identifier.identify(received).count == 3
 
 
-def test_a_combination_without_contrast_shows_nothing():
+def test_a_combination_without_contrast_shows_nothing() -> None:
     same = ImageStack((IMAGES[0], IMAGES[0]))
     found = Identifier(lambda image: targets(3), SHORT, expected_targets=4).identify(same)
     assert found.count == 3
 
 
-def test_stacks_are_searched_at_half_their_size():
+def test_stacks_are_searched_at_half_their_size() -> None:
     settings = AdaptiveSettings(coarse=True, genetic=GeneticSettings(max_evaluations=8))
     shapes: set[tuple[int, ...]] = set()
 

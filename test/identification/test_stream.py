@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -42,7 +43,7 @@ def stream(names: str) -> list[tuple[str, str, int]]:
     return [(name, 'mono8', number) for number, name in enumerate(names)]
 
 
-def test_a_tumbling_window_gives_each_image_to_one_stack():
+def test_a_tumbling_window_gives_each_image_to_one_stack() -> None:
     window: Window[str] = Window(StackSettings(stack=3))
     assert gathered(window, *stream('abcdefg')) == [('abc', 3, ''), ('def', 3, '')]
     assert window.fresh == 1
@@ -52,7 +53,7 @@ def test_a_tumbling_window_gives_each_image_to_one_stack():
     assert window.end('the bag ends') == []
 
 
-def test_a_sliding_window_answers_every_image_once_it_is_full():
+def test_a_sliding_window_answers_every_image_once_it_is_full() -> None:
     window: Window[str] = Window(StackSettings(stack=3, stack_window=SLIDING))
     assert gathered(window, *stream('abcde')) == [('abc', 3, ''), ('bcd', 1, ''), ('cde', 1, '')]
     assert window.end('no more') == []
@@ -66,7 +67,9 @@ def test_a_sliding_window_answers_every_image_once_it_is_full():
         (('c', 'mono8', -2_000_000_000), '2 of 3 images: the stamp of the next image is 2'),
     ],
 )
-def test_images_that_do_not_belong_together_begin_a_new_stack(window, third, reason):
+def test_images_that_do_not_belong_together_begin_a_new_stack(
+    window: Any, third: tuple[str, str, int], reason: str
+) -> None:
     gathering: Window[str] = Window(StackSettings(stack=3, stack_window=window))
     _, kind, time = third
     rest = [('d', kind, time), ('e', kind, time)]
@@ -76,13 +79,13 @@ def test_images_that_do_not_belong_together_begin_a_new_stack(window, third, rea
     assert full == ('cde', 3, '')
 
 
-def test_single_images_are_never_held_back():
+def test_single_images_are_never_held_back() -> None:
     window: Window[str] = Window(StackSettings())
     added = [('a', 'mono8', 5), ('b', 'rgb8', 3)]
     assert gathered(window, *added) == [('a', 1, ''), ('b', 1, '')]
 
 
-def test_a_stack_identifies_what_no_image_does():
+def test_a_stack_identifies_what_no_image_does() -> None:
     images = [render(SCENE, phase).image for phase in range(4)]
     truth = {target.id for target in render(SCENE).targets}
     settings = StackSettings(stack=4)
@@ -92,7 +95,7 @@ def test_a_stack_identifies_what_no_image_does():
     assert {target.id for target in found.targets} == truth
 
 
-def test_a_stack_is_split_where_the_scene_moved():
+def test_a_stack_is_split_where_the_scene_moved() -> None:
     scene = replace(SCENE, light='normal', phases=1)
     still = render(scene).image
     images = [still, still, np.roll(still, 4, axis=1), np.roll(still, 4, axis=1)]
@@ -110,7 +113,9 @@ def test_a_stack_is_split_where_the_scene_moved():
 
 
 @pytest.mark.parametrize(('shift', 'expected', 'parts'), [(0, 8, 1), (3, 8, 2), (0, 0, 2)])
-def test_a_fine_pattern_that_moves_is_no_scene_that_moved(shift, expected, parts):
+def test_a_fine_pattern_that_moves_is_no_scene_that_moved(
+    shift: int, expected: int, parts: int
+) -> None:
     scene = replace(SCENE, targets=8, dot_radius=6.0, light='fine_stripe', light_scale=0.3)
     scene = replace(scene, tilt=20.0, ambient=0.12, phases=4, seed=7)
     images = [np.roll(render(scene, it).image, shift * it, axis=1) for it in range(2)]
@@ -120,7 +125,7 @@ def test_a_fine_pattern_that_moves_is_no_scene_that_moved(shift, expected, parts
     assert len(found) == parts
 
 
-def test_images_of_another_type_are_a_part_of_their_own():
+def test_images_of_another_type_are_a_part_of_their_own() -> None:
     image = render(SCENE).image
     parts = unmoved_parts([image, image.astype(np.uint16), image.astype(np.uint16)])
     assert [part.images for part in parts] == [range(1), range(1, 3)]
@@ -134,7 +139,7 @@ def test_images_of_another_type_are_a_part_of_their_own():
         ({'stack_window': 'rolling'}, "stack_window is 'rolling'"),
     ],
 )
-def test_bad_settings_are_named(values, message):
+def test_bad_settings_are_named(values: dict[str, int] | dict[str, str], message: str) -> None:
     with pytest.raises(ValueError, match=message):
         StackSettings(**values)
 
@@ -147,13 +152,13 @@ class Searched:
     def __init__(self, error: Exception | None = None) -> None:
         self.error = error
 
-    def __call__(self, image):
+    def __call__(self, image: np.ndarray) -> Any:
         if self.error:
             raise self.error
         return []
 
 
-def said(events) -> list[tuple[str, int, bool] | Kind]:
+def said(events: Any) -> list[tuple[str, int, bool] | Kind]:
     return [
         it.kind if isinstance(it, Remark) else (''.join(it.items), it.fresh, it.stack.shape[1] > 0)
         for it in events
@@ -165,7 +170,7 @@ def frame(name: str, width: int = 40, stamp: int = 0) -> Frame[str]:
     return Frame(item=name, image=image, kind=f'{width} px', stamp=stamp)
 
 
-def test_a_stream_answers_and_says_why_it_does_not():
+def test_a_stream_answers_and_says_why_it_does_not() -> None:
     stream = Stream(IdentificationSettings(), StackSettings(stack=3), Searched())
     events = [said(stream.add(lambda it=it: frame(*it))) for it in (('a',), ('b',), ('c', 50))]
     assert events == [[], [], [Kind.INCOMPLETE, ('ab', 2, True)]]
@@ -178,21 +183,21 @@ def test_a_stream_answers_and_says_why_it_does_not():
     ('error', 'text'),
     [(ValueError('bad\x00'), 'bad\\x00'), (MemoryError('large'), 'MemoryError: large')],
 )
-def test_what_a_detector_raises_is_why_an_image_is_refused(error, text):
+def test_what_a_detector_raises_is_why_an_image_is_refused(error: Any, text: str) -> None:
     stream = Stream(IdentificationSettings(), StackSettings(), Searched(error))
     (remark,) = stream.add(lambda: frame('a'))
     assert remark == Remark(Kind.FAILED, text)
     assert remark.items == ('a',)
 
 
-def test_a_detector_that_cannot_be_used_is_no_fault_of_an_image():
+def test_a_detector_that_cannot_be_used_is_no_fault_of_an_image() -> None:
     stream = Stream(IdentificationSettings(), StackSettings(), Searched(Unavailable('gone')))
     (remark,) = stream.add(lambda: frame('a'))
     assert (remark.kind, remark.items) == (Kind.FAILED, ('a',))
     assert isinstance(remark.error, Unavailable)
 
 
-def test_every_image_that_gets_no_answer_is_in_a_remark():
+def test_every_image_that_gets_no_answer_is_in_a_remark() -> None:
     detector = Searched()
     stream = Stream(IdentificationSettings(), StackSettings(stack=2), detector)
     assert [it.items for it in stream.add(lambda: {}['no image'], 'a')] == [('a',)]
@@ -207,7 +212,7 @@ def test_every_image_that_gets_no_answer_is_in_a_remark():
     assert (remark.kind, remark.items) == (Kind.FAILED, ('d', 'e'))
 
 
-def test_a_stream_that_is_resumed_goes_on_as_if_it_had_not_ended():
+def test_a_stream_that_is_resumed_goes_on_as_if_it_had_not_ended() -> None:
     settings = IdentificationSettings(
         expected_targets=4, detection=DetectorSettings(family='metashape12')
     )

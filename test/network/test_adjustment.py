@@ -1,7 +1,9 @@
 """The adjustment of simulated networks: values, covariances, datum, wrong IDs, bad input."""
 
 import re
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from typing import Any, TypeAlias
 
 import numpy as np
 import pytest
@@ -10,9 +12,10 @@ from ahf_ros.network import normals
 from ahf_ros.network.adjustment import adjust
 from ahf_ros.network.camera import PARAMETERS, project
 from ahf_ros.network.datum import Datum, movements
-from ahf_ros.network.network import CameraView, ControlPoint, ScaleBar
+from ahf_ros.network.network import CameraView, ControlPoint, Network, ScaleBar
 from ahf_ros.network.refinement import refine
 from ahf_ros.network.similarity import similarity_between
+from ahf_ros.network.solution import Start
 from benchmarks.network_errors import RELEASED, counted, coverage
 from support.camcal import dbat, folder, in_dbat_units, solve
 from support.network_scenes import Field, approximate, simulate
@@ -20,15 +23,20 @@ from support.network_scenes import Field, approximate, simulate
 pytest.importorskip('scipy')
 FIELD = Field(photographs=10, targets=20)
 
+Scene: TypeAlias = tuple[Network, Start, Start]
+"""A network, its true values, and others to start from."""
+
 
 @pytest.fixture
-def scene():
+def scene() -> Scene:
     random = np.random.default_rng(3)
     network, truth = simulate(FIELD, random)
     return network, truth, approximate(truth, random)
 
 
-def named(scene, names, scale=1.0, offset=0.0):
+def named(
+    scene: Scene, names: Iterable[str], scale: float = 1.0, offset: float = 0.0
+) -> tuple[ControlPoint, ...]:
     """Return control points at true coordinates, in a scale and with an offset."""
     _, truth, _ = scene
     return tuple(
@@ -37,11 +45,11 @@ def named(scene, names, scale=1.0, offset=0.0):
     )
 
 
-def distance(points, first, second):
+def distance(points: np.ndarray, first: int, second: int) -> float:
     return float(np.linalg.norm(points[first] - points[second]))
 
 
-def test_refine_brings_values_near_the_truth(scene):
+def test_refine_brings_values_near_the_truth(scene: Scene) -> None:
     network, truth, start = scene
     refined = refine(network, start, ('f', 'k1', 'k2', 'cx', 'cy'))
     movement = similarity_between(refined.points, truth.points)
@@ -50,7 +58,7 @@ def test_refine_brings_values_near_the_truth(scene):
     assert refined.used.mean() > 0.99
 
 
-def test_stages_release_what_is_significant(scene):
+def test_stages_release_what_is_significant(scene: Scene) -> None:
     network, truth, start = scene
     solution = adjust(network, start)
     assert {'f', 'k1', 'cx', 'p1'} <= set(solution.released[0])
@@ -62,7 +70,7 @@ def test_stages_release_what_is_significant(scene):
     assert (np.abs(error) < 5 * np.maximum(sigma[:3], 0.5)).all()
 
 
-def test_covariances_are_those_of_the_whole_inverse(scene):
+def test_covariances_are_those_of_the_whole_inverse(scene: Scene) -> None:
     """Poses eliminated or not, the inverse is the same: here by the dense Jacobian."""
     network, _, start = scene
     solution = adjust(network, start, release=('f',), test=False)
@@ -96,7 +104,7 @@ def test_covariances_are_those_of_the_whole_inverse(scene):
 
 
 @pytest.mark.parametrize('planar', [False, True])
-def test_ellipsoids_hold_the_truth(planar):
+def test_ellipsoids_hold_the_truth(planar: bool) -> None:
     held = []
     for run in range(12):
         random = np.random.default_rng([4, run])
@@ -106,7 +114,7 @@ def test_ellipsoids_hold_the_truth(planar):
     assert 0.88 < np.mean(held) <= 0.99
 
 
-def test_wrong_ids_and_a_moved_target_are_found():
+def test_wrong_ids_and_a_moved_target_are_found() -> None:
     wrong, accepted, good, kept, found = counted(Field(16, 40, each=30), np.random.default_rng(5))
     assert wrong > 20
     assert accepted == 0
@@ -114,7 +122,7 @@ def test_wrong_ids_and_a_moved_target_are_found():
     assert found
 
 
-def test_every_rejection_says_what_and_why(scene):
+def test_every_rejection_says_what_and_why(scene: Scene) -> None:
     network, _, start = scene
     observations = network.observations
     row = int(np.flatnonzero(observations.point == 7)[0])
@@ -143,7 +151,7 @@ def test_every_rejection_says_what_and_why(scene):
     assert rejection.normalised_residual > 4.7
 
 
-def test_bars_give_scale_and_redundancy(scene):
+def test_bars_give_scale_and_redundancy(scene: Scene) -> None:
     network, truth, start = scene
     bars = tuple(
         ScaleBar((str(a), str(b)), 500 * distance(truth.points, a, b), 0.01)
@@ -162,7 +170,7 @@ def test_bars_give_scale_and_redundancy(scene):
 
 @pytest.mark.parametrize('planar', [False, True])
 @pytest.mark.parametrize('sigma', [0.0, 1e-4])
-def test_a_known_field_calibrates_its_camera(planar, sigma):
+def test_a_known_field_calibrates_its_camera(planar: bool, sigma: float) -> None:
     random = np.random.default_rng(12)
     network, truth = simulate(replace(FIELD, planar=planar), random)
     control = tuple(
@@ -179,7 +187,7 @@ def test_a_known_field_calibrates_its_camera(planar, sigma):
     assert np.isfinite(solution.measured_points.covariance).all()
 
 
-def test_photographs_without_rolls_know_less_of_the_principal_point_and_say_so():
+def test_photographs_without_rolls_know_less_of_the_principal_point_and_say_so() -> None:
     errors, deviations = [], []
     for rolled in (True, False):
         random = np.random.default_rng(13)
@@ -191,7 +199,7 @@ def test_photographs_without_rolls_know_less_of_the_principal_point_and_say_so()
     assert (deviations[1] > 1.3 * deviations[0]).all()
 
 
-def test_heavy_tails_are_no_reason_to_reject():
+def test_heavy_tails_are_no_reason_to_reject() -> None:
     kept, expected = 0, 0.0
     for run in range(3):
         random = np.random.default_rng([14, run])
@@ -214,7 +222,7 @@ def test_heavy_tails_are_no_reason_to_reject():
     assert expected > 1
 
 
-def test_fixed_control_points_stay(scene):
+def test_fixed_control_points_stay(scene: Scene) -> None:
     network, truth, start = scene
     control = named(scene, '0369', scale=1000, offset=5.0)
     solution = adjust(replace(network, control=control), start, release=RELEASED, test=False)
@@ -227,7 +235,7 @@ def test_fixed_control_points_stay(scene):
     assert np.abs(error).max() < 1
 
 
-def test_image_points_that_fit_badly_are_a_warning(scene):
+def test_image_points_that_fit_badly_are_a_warning(scene: Scene) -> None:
     network, _, start = scene
     seen = network.observations
     small = replace(network, observations=replace(seen, covariance=seen.covariance / 100))
@@ -237,7 +245,7 @@ def test_image_points_that_fit_badly_are_a_warning(scene):
     assert any('sigma0 is' in it for it in adjust(small, start, release=RELEASED).warnings)
 
 
-def test_three_fixed_targets_are_the_axes(scene):
+def test_three_fixed_targets_are_the_axes(scene: Scene) -> None:
     network, _, start = scene
     solution = adjust(network, start, Datum('fixed', ('0', '1', '2')), ('f',), test=False)
     points = solution.start.points
@@ -249,7 +257,7 @@ def test_three_fixed_targets_are_the_axes(scene):
     assert solution.sigma0 == pytest.approx(inner.sigma0, rel=1e-6)
 
 
-def bars_of(truth, factors, sigma=0.0002):
+def bars_of(truth: Start, factors: Sequence[float], sigma: float = 0.0002) -> tuple[ScaleBar, ...]:
     """Return bars between targets 0-1, 2-3 and so on, longer than they are by factors."""
     ends = [(2 * place, 2 * place + 1) for place in range(len(factors))]
     return tuple(
@@ -258,14 +266,14 @@ def bars_of(truth, factors, sigma=0.0002):
     )
 
 
-def test_a_bar_in_another_unit_is_refused(scene):
+def test_a_bar_in_another_unit_is_refused(scene: Scene) -> None:
     network, truth, start = scene
     bars = bars_of(truth, (1.0, 1000.0, 1.0))
     with pytest.raises(ValueError, match=r'2-3 is .* times as long as the other.* 1000:'):
         adjust(replace(network, bars=bars), start)
 
 
-def test_bars_in_other_units_than_control_are_named(scene):
+def test_bars_in_other_units_than_control_are_named(scene: Scene) -> None:
     network, truth, start = scene
     bar = ScaleBar(('0', '1'), 1000 * distance(truth.points, 0, 1), 0.1)
     with pytest.raises(ValueError, match=r'0-1 is .* control points say; a factor of 1000'):
@@ -273,7 +281,7 @@ def test_bars_in_other_units_than_control_are_named(scene):
 
 
 @pytest.mark.parametrize('factor', [1.01, 1.5])
-def test_a_wrong_bar_is_named_and_no_ray_is_lost(scene, factor):
+def test_a_wrong_bar_is_named_and_no_ray_is_lost(scene: Scene, factor: float) -> None:
     network, truth, start = scene
     network = replace(network, bars=bars_of(truth, (1.0, factor, 1.0, 1.0)), unit='m')
     solution = adjust(network, start)
@@ -291,7 +299,7 @@ def test_a_wrong_bar_is_named_and_no_ray_is_lost(scene, factor):
     assert not kept.rejected
 
 
-def test_of_two_bars_that_contradict_both_are_named(scene):
+def test_of_two_bars_that_contradict_both_are_named(scene: Scene) -> None:
     network, truth, start = scene
     network = replace(network, bars=bars_of(truth, (1.0, 1.01)), unit='m')
     solution = adjust(network, start)
@@ -304,7 +312,7 @@ def test_of_two_bars_that_contradict_both_are_named(scene):
     assert sigma > 0.002  # what they contradict each other by is in the covariance
 
 
-def test_bars_that_all_contradict_each_other_are_all_named(scene):
+def test_bars_that_all_contradict_each_other_are_all_named(scene: Scene) -> None:
     network, truth, start = scene
     bars = bars_of(truth, (1.0, 1.01, 1.02, 0.99, 0.985, 1.015))
     solution = adjust(replace(network, bars=bars, unit='m'), start)
@@ -314,7 +322,7 @@ def test_bars_that_all_contradict_each_other_are_all_named(scene):
     assert not solution.rejected
 
 
-def test_one_bar_cannot_be_checked(scene):
+def test_one_bar_cannot_be_checked(scene: Scene) -> None:
     network, truth, start = scene
     network = replace(network, bars=bars_of(truth, (1.01,)), unit='m')
     solution = adjust(network, start)
@@ -323,7 +331,9 @@ def test_one_bar_cannot_be_checked(scene):
 
 
 @pytest.mark.parametrize(('count', 'said'), [(2, True), (3, False)])
-def test_bars_that_cannot_tell_which_is_wrong_are_said(scene, count, said):
+def test_bars_that_cannot_tell_which_is_wrong_are_said(
+    scene: Scene, count: int, said: bool
+) -> None:
     network, truth, start = scene
     ends = [(0, 1), (2, 3), (4, 5)][:count]
     bars = tuple(ScaleBar((str(a), str(b)), distance(truth.points, a, b), 0.001) for a, b in ends)
@@ -331,7 +341,7 @@ def test_bars_that_cannot_tell_which_is_wrong_are_said(scene, count, said):
     assert any('too few to tell which one is wrong' in it for it in solution.warnings) == said
 
 
-def test_a_check_bar_that_fails_is_a_suspect(scene):
+def test_a_check_bar_that_fails_is_a_suspect(scene: Scene) -> None:
     network, truth, start = scene
     used, check = bars_of(truth, (1.0, 1.01))
     bars = (used, replace(check, check=True))
@@ -341,7 +351,7 @@ def test_a_check_bar_that_fails_is_a_suspect(scene):
 
 
 @pytest.mark.parametrize('sigma', [0.0, 0.001, 0.1])
-def test_a_wrong_control_point_is_named(scene, sigma):
+def test_a_wrong_control_point_is_named(scene: Scene, sigma: float) -> None:
     network, _, start = scene
     control = tuple(
         replace(it, covariance=sigma**2 * np.eye(3))
@@ -355,7 +365,7 @@ def test_a_wrong_control_point_is_named(scene, sigma):
     assert not solution.rejected
 
 
-def test_control_points_without_sigma_get_the_one_that_fits(scene):
+def test_control_points_without_sigma_get_the_one_that_fits(scene: Scene) -> None:
     network, _, start = scene
     random = np.random.default_rng(8)
     control = tuple(
@@ -369,14 +379,14 @@ def test_control_points_without_sigma_get_the_one_that_fits(scene):
     assert 0.012 < fits < 0.03
 
 
-def test_a_bar_whose_end_is_not_seen_is_not_used(scene):
+def test_a_bar_whose_end_is_not_seen_is_not_used(scene: Scene) -> None:
     network, _, start = scene
     network = replace(network, bars=(ScaleBar(('0', 'nowhere'), 1.0, 0.001),))
     solution = adjust(network, start, release=('f',))
     assert 'scale bar 0-nowhere: nowhere is in no two photographs' in solution.warnings[0]
 
 
-def test_mirrored_and_exchanged_control_points_are_named(scene):
+def test_mirrored_and_exchanged_control_points_are_named(scene: Scene) -> None:
     network, _, start = scene
     control = named(scene, '012345')
     mirrored = tuple(replace(point, xyz=point.xyz * [1, 1, -1]) for point in control)
@@ -403,7 +413,7 @@ def test_mirrored_and_exchanged_control_points_are_named(scene):
         ('covariance', 1.0, 'covariance .* of target 0 in 0.jpg: expected symmetric positive'),
     ],
 )
-def test_bad_observations_are_named(scene, field, change, message):
+def test_bad_observations_are_named(scene: Scene, field: str, change: float, message: str) -> None:
     network, _, start = scene
     values = getattr(network.observations, field).copy()
     first = np.flatnonzero(network.observations.point == 0)[0]
@@ -413,7 +423,7 @@ def test_bad_observations_are_named(scene, field, change, message):
         adjust(bad, start)
 
 
-def test_a_target_twice_in_a_photograph_is_refused(scene):
+def test_a_target_twice_in_a_photograph_is_refused(scene: Scene) -> None:
     network, _, start = scene
     point = network.observations.point.copy()
     point[1] = point[0]
@@ -434,13 +444,13 @@ def test_a_target_twice_in_a_photograph_is_refused(scene):
         ),
     ],
 )
-def test_bad_knowledge_is_named(scene, knowledge, message):
+def test_bad_knowledge_is_named(scene: Scene, knowledge: dict[str, Any], message: str) -> None:
     network, _, start = scene
     with pytest.raises(ValueError, match=message):
         adjust(replace(network, **knowledge), start)
 
 
-def test_datum_needs_three_seen_targets(scene):
+def test_datum_needs_three_seen_targets(scene: Scene) -> None:
     network, _, start = scene
     with pytest.raises(ValueError, match='0, 1 hold no frame'):
         adjust(network, start, Datum('inner', ('0', '1')))
@@ -448,7 +458,7 @@ def test_datum_needs_three_seen_targets(scene):
         adjust(network, start, Datum('inner', ('0', '1', 'nowhere')))
 
 
-def test_knowledge_without_variance_must_not_repeat_itself(scene):
+def test_knowledge_without_variance_must_not_repeat_itself(scene: Scene) -> None:
     network, truth, start = scene
     bar = ScaleBar(('0', '3'), distance(truth.points, 0, 3), 0.0)
     network = replace(network, bars=(bar,), control=named(scene, '0369'))
@@ -456,7 +466,7 @@ def test_knowledge_without_variance_must_not_repeat_itself(scene):
         adjust(network, start, release=('f',), test=False)
 
 
-def test_targets_on_a_line_are_refused(scene):
+def test_targets_on_a_line_are_refused(scene: Scene) -> None:
     network, truth, _ = scene
     observations = network.observations
     points = np.linspace(-1, 1, 20)[:, None] * [1, 0.5, 0.2]
@@ -471,7 +481,7 @@ def test_targets_on_a_line_are_refused(scene):
         adjust(network, replace(truth, points=points))
 
 
-def test_photographs_of_a_plane_straight_on_do_not_determine_the_focal_length():
+def test_photographs_of_a_plane_straight_on_do_not_determine_the_focal_length() -> None:
     random = np.random.default_rng(6)
     network, truth = simulate(replace(FIELD, planar=True), random)
     observations = network.observations
@@ -492,7 +502,7 @@ def test_photographs_of_a_plane_straight_on_do_not_determine_the_focal_length():
     assert any('do not determine the focal length' in text for text in solution.warnings)
 
 
-def test_a_focal_length_that_was_given_wrongly_is_named(scene):
+def test_a_focal_length_that_was_given_wrongly_is_named(scene: Scene) -> None:
     network, truth, start = scene
     for given, named in ((1280.0, True), (3150.0, False)):
         view = CameraView('camera', 4000, 3000, given)
@@ -502,7 +512,7 @@ def test_a_focal_length_that_was_given_wrongly_is_named(scene):
         assert any(text in it for it in solution.warnings) == named
 
 
-def test_a_fixed_camera_stays(scene):
+def test_a_fixed_camera_stays(scene: Scene) -> None:
     network, truth, start = scene
     view = CameraView('camera', 4000, 3000, calibration=truth.calibrations[0], fixed=True)
     start = replace(start, calibrations=truth.calibrations.copy())
@@ -512,7 +522,7 @@ def test_a_fixed_camera_stays(scene):
 
 
 @pytest.mark.skipif(folder() is None, reason='AHF_NETWORKS does not name the networks')
-def test_camcal_is_as_dbat_has_it():
+def test_camcal_is_as_dbat_has_it() -> None:
     solution = solve(folder())
     values, deviations = in_dbat_units(solution)
     theirs, their_deviations = dbat(folder())

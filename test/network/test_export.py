@@ -11,6 +11,7 @@ import tempfile
 import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -166,7 +167,7 @@ SEVEN = target(7, 1, 1)
     ],
 )
 def test_what_a_format_cannot_hold_is_named(
-    name, images, control, message, tmp_path: Path
+    name: str, images: Any, control: Any, message: str, tmp_path: Path
 ) -> None:
     with pytest.raises(ValueError, match=message):
         Export(name, tmp_path).write(images, control)
@@ -189,7 +190,9 @@ def test_a_full_disk_leaves_whole_files(name: str, tmp_path: Path) -> None:
     assert {it: it.read_bytes() for it in tmp_path.rglob('*') if it.is_file()} == before
 
 
-def test_a_database_that_cannot_be_made_is_named(tmp_path: Path, monkeypatch) -> None:
+def test_a_database_that_cannot_be_made_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(tempfile, 'tempdir', str(tmp_path / 'missing'))
     with pytest.raises(ValueError, match=r'targets\.db cannot be written: No such file'):
         Export('colmap', tmp_path).write(IMAGES)
@@ -234,7 +237,9 @@ class Camera(SimpleNamespace):
     __hash__ = object.__hash__
 
 
-def test_the_script_sets_the_markers(folder: Path, monkeypatch, capsys) -> None:
+def test_the_script_sets_the_markers(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     camera = Camera(label='b', photo=SimpleNamespace(path='C:\\photos\\b.jpg'))
     there = Marker('7')
     module = console([camera], [there])

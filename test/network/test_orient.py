@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import pytest
@@ -69,7 +70,7 @@ def oriented_by_five() -> Solution:
     return solution
 
 
-def error(solution, truth: np.ndarray) -> float:
+def error(solution: Any, truth: np.ndarray) -> float:
     known = np.isfinite(solution.start.points[:, 0])
     assert known.mean() > 0.95
     return float(np.abs(deviations(solution.start.points[known], truth[known])).max())
@@ -77,7 +78,7 @@ def error(solution, truth: np.ndarray) -> float:
 
 @pytest.mark.parametrize('depth', [0.0, 0.3])
 @pytest.mark.parametrize('focal', [pytest.param(None, marks=pytest.mark.lasting), FOCAL])
-def test_nothing_but_ids_orients_a_network(depth: float, focal: float | None):
+def test_nothing_but_ids_orients_a_network(depth: float, focal: float | None) -> None:
     seen = taken(depth=depth, focal=focal)
     (solution,) = orient(seen.network)
     assert error(solution, seen.points) < 1e-3
@@ -88,7 +89,7 @@ def test_nothing_but_ids_orients_a_network(depth: float, focal: float | None):
 
 @pytest.mark.lasting
 @pytest.mark.parametrize('k1', [-0.3, 0.1])
-def test_a_lens_with_distortion_that_nobody_gave(k1: float):
+def test_a_lens_with_distortion_that_nobody_gave(k1: float) -> None:
     seen = taken(count=5, lens={'k1': k1, 'cx': 50.0, 'cy': -40.0})
     (solution,) = orient(seen.network)
     assert np.isfinite(solution.start.positions).all()
@@ -96,7 +97,7 @@ def test_a_lens_with_distortion_that_nobody_gave(k1: float):
 
 
 @pytest.mark.lasting
-def test_half_of_the_photographs_of_the_panel():
+def test_half_of_the_photographs_of_the_panel() -> None:
     """Its lens displaces image points by up to 40 px; true lengths are those of a scale bar."""
     every = read_observations(ROOT / 'docs' / 'examples' / 'panel.csv')
     network, _ = make_network(every[::2])
@@ -107,7 +108,7 @@ def test_half_of_the_photographs_of_the_panel():
     assert first / second == pytest.approx(608.8297 / 747.6563, rel=2e-4)
 
 
-def test_the_frame_is_that_of_the_principal_axes():
+def test_the_frame_is_that_of_the_principal_axes() -> None:
     solution = oriented_by_five()
     points = solution.measured_points.xyz
     np.testing.assert_allclose(points.mean(axis=0), 0, atol=1e-3)
@@ -118,7 +119,7 @@ def test_the_frame_is_that_of_the_principal_axes():
 
 
 @pytest.mark.lasting
-def test_a_fisheye_lens_is_fitted():
+def test_a_fisheye_lens_is_fitted() -> None:
     seen = taken(count=8, focal=1000.0, number=60)
     network = seen.network
     source = np.random.default_rng(9)
@@ -149,7 +150,7 @@ def test_a_fisheye_lens_is_fitted():
     assert (np.abs(found) < 4 * np.sqrt(np.diag(solution.camera_covariances[0])[:3])).all()
 
 
-def test_targets_at_one_place_in_the_image_give_no_pose():
+def test_targets_at_one_place_in_the_image_give_no_pose() -> None:
     seen = taken(focal=FOCAL)
     observed = seen.network.observations
     last, random = observed.photograph == 5, np.random.default_rng(2)
@@ -162,7 +163,7 @@ def test_targets_at_one_place_in_the_image_give_no_pose():
     assert error(solution, seen.points) < 1e-3
 
 
-def test_two_photographs_are_never_a_network():
+def test_two_photographs_are_never_a_network() -> None:
     """What is left of three photographs of which one contradicts the others is no network."""
     network = taken(count=3, focal=FOCAL).network
     mixed = network.observations.point.copy()
@@ -172,7 +173,7 @@ def test_two_photographs_are_never_a_network():
         orient(replace(network, observations=replace(network.observations, point=mixed)))
 
 
-def test_wrong_ids_are_named():
+def test_wrong_ids_are_named() -> None:
     seen = taken(focal=FOCAL, wrong=0.05)
     (solution,) = orient(seen.network)
     assert error(solution, seen.points) < 1e-3
@@ -185,14 +186,14 @@ def test_wrong_ids_are_named():
     assert wrong and wrong <= rejected
 
 
-def test_the_same_network_gives_the_same_bits():
+def test_the_same_network_gives_the_same_bits() -> None:
     first = oriented_by_five()
     (second,) = orient(taken(count=5, focal=FOCAL).network)
     assert np.array_equal(first.start.points, second.start.points, equal_nan=True)
 
 
 @pytest.mark.lasting
-def test_a_target_twice_in_a_photograph_is_set_aside():
+def test_a_target_twice_in_a_photograph_is_set_aside() -> None:
     seen = taken(focal=FOCAL)
     observed = seen.network.observations
     rows = np.append(np.arange(len(observed.xy)), 3)
@@ -220,7 +221,7 @@ def of_few(number: int, changed: int | None = None) -> Network:
 
 
 @pytest.mark.lasting
-def test_four_targets_orient_a_photograph_if_they_agree():
+def test_four_targets_orient_a_photograph_if_they_agree() -> None:
     (solution,) = orient(of_few(4))
     assert solution.oriented.all() and not any('not oriented' in it for it in solution.warnings)
     whole = oriented_by_five().start
@@ -234,7 +235,7 @@ def test_four_targets_orient_a_photograph_if_they_agree():
 
 
 @pytest.mark.lasting
-def test_groups_that_do_not_hang_together_are_oriented_each_by_itself():
+def test_groups_that_do_not_hang_together_are_oriented_each_by_itself() -> None:
     seen = taken(count=8, focal=FOCAL)
     observed = seen.network.observations
     names = tuple(str(index) for index in range(60))
@@ -247,7 +248,7 @@ def test_groups_that_do_not_hang_together_are_oriented_each_by_itself():
 
 
 @pytest.mark.lasting
-def test_portrait_and_landscape_are_two_cameras():
+def test_portrait_and_landscape_are_two_cameras() -> None:
     rotations, positions = ring(8, 35)
     cameras = CameraView('landscape', 3000, 2000), CameraView('portrait', 2000, 3000)
     calibrations = np.stack([pinhole(FOCAL, 3000, 2000), pinhole(FOCAL, 2000, 3000)])
@@ -260,7 +261,7 @@ def test_portrait_and_landscape_are_two_cameras():
     assert solution.start.calibrations[:, 0] == pytest.approx(FOCAL, rel=5e-3)
 
 
-def zooming(zooms: Sequence[float]):
+def zooming(zooms: Sequence[float]) -> tuple[Rendered, np.ndarray]:
     """Return one photograph of 20 targets a zoom, all of one camera, with its targets."""
     rotations, positions = ring(len(zooms), 35)
     calibrations = np.stack([pinhole(FOCAL * zoom, 3000, 2000) for zoom in zooms])
@@ -270,7 +271,7 @@ def zooming(zooms: Sequence[float]):
 
 
 @pytest.mark.lasting
-def test_another_zoom_gets_a_camera_of_its_own():
+def test_another_zoom_gets_a_camera_of_its_own() -> None:
     seen, points = zooming((1, 1, 1, 1.2, 1.2, 1, 1, 1))
     (solution,) = orient(seen.network)
     assert solution.oriented.all()
@@ -281,7 +282,7 @@ def test_another_zoom_gets_a_camera_of_its_own():
 
 
 @pytest.mark.lasting
-def test_each_photograph_may_have_its_own_zoom():
+def test_each_photograph_may_have_its_own_zoom() -> None:
     zooms = np.random.default_rng(4).uniform(0.9, 1.1, 12)
     seen, points = zooming(zooms)
     (solution,) = orient(seen.network)
@@ -293,7 +294,7 @@ def test_each_photograph_may_have_its_own_zoom():
 
 @pytest.mark.lasting
 @pytest.mark.parametrize('depth', [0.0, 0.3])
-def test_parallel_photographs_do_not_tell_the_focal_length(depth: float):
+def test_parallel_photographs_do_not_tell_the_focal_length(depth: float) -> None:
     rotations = [looking(np.array([0, 0, -1.0]), 0)] * 4
     positions = [np.array([x, y, 2.5]) for x in (-0.4, 0.4) for y in (-0.3, 0.3)]
     camera, of = CameraView('camera', 3000, 2000), np.zeros(4, dtype=int)
@@ -312,7 +313,7 @@ def without(network: Network, keep: np.ndarray) -> Network:
     )
 
 
-def test_too_little_is_refused_in_words():
+def test_too_little_is_refused_in_words() -> None:
     network = taken(focal=FOCAL).network
     observed = network.observations
     with pytest.raises(ValueError, match='photographs: 2 with targets, expected three'):
@@ -326,7 +327,7 @@ def test_too_little_is_refused_in_words():
         orient(without(network, few))
 
 
-def test_targets_on_a_line_are_refused():
+def test_targets_on_a_line_are_refused() -> None:
     rotations, positions = ring(6, 35)
     camera, of = CameraView('camera', 3000, 2000, FOCAL), np.zeros(6, dtype=int)
     calibration = pinhole(FOCAL, 3000, 2000)[None]

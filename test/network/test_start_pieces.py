@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -14,7 +16,9 @@ from support.random_networks import looking
 SIGMA = 2e-5
 
 
-def view(direction, distance: float = 4.0, roll: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+def view(
+    direction: Any, distance: float = 4.0, roll: float = 0.0
+) -> tuple[np.ndarray, np.ndarray]:
     away = np.array(direction) / np.linalg.norm(direction)
     return looking(-away, roll), distance * away
 
@@ -36,7 +40,7 @@ ONE, OTHER = view([0.4, 0.1, 1]), view([-0.3, 0.5, 1], 3.5, 1.2)
 
 
 @pytest.mark.parametrize('depth', [0.0, 0.5])
-def test_relative_orientation_is_among_those_that_fit(depth: float):
+def test_relative_orientation_is_among_those_that_fit(depth: float) -> None:
     points = field(30, depth)
     first, second = seen(points, ONE), seen(points, OTHER)
     second[:2] = second[[1, 0]]  # two IDs exchanged
@@ -50,7 +54,7 @@ def test_relative_orientation_is_among_those_that_fit(depth: float):
     assert best.agrees.sum() >= 27
 
 
-def test_the_criterion_prefers_the_homography_of_a_plane():
+def test_the_criterion_prefers_the_homography_of_a_plane() -> None:
     points = field(30, 0)
     noise = np.random.default_rng(2).normal(0, SIGMA, (2, 30, 2))
     first, second = seen(points, ONE) + noise[0], seen(points, OTHER) + noise[1]
@@ -59,13 +63,13 @@ def test_the_criterion_prefers_the_homography_of_a_plane():
     assert min(angle(one.rotation, OTHER[0] @ ONE[0].T) for one in found[:2]) < 0.1
 
 
-def test_too_few_common_points_have_no_relative_orientation():
+def test_too_few_common_points_have_no_relative_orientation() -> None:
     points = field(5, 0.5)
     assert relative_orientations(seen(points, ONE), seen(points, OTHER), SIGMA) == []
 
 
 @pytest.mark.parametrize('depth', [0.0, 0.5])
-def test_resection_with_wrong_ids(depth: float):
+def test_resection_with_wrong_ids(depth: float) -> None:
     points = field(20, depth)
     xy = seen(points, OTHER)
     xy[:3] = xy[[2, 0, 1]]
@@ -75,7 +79,7 @@ def test_resection_with_wrong_ids(depth: float):
     assert np.array_equal(np.flatnonzero(~best.agrees), [0, 1, 2])
 
 
-def test_both_poses_of_a_far_plane_are_kept():
+def test_both_poses_of_a_far_plane_are_kept() -> None:
     points = field(20, 0)
     pose = view([0.3, 0, 1], 2000)
     noise = np.random.default_rng(3).normal(0, SIGMA, (20, 2))
@@ -85,7 +89,7 @@ def test_both_poses_of_a_far_plane_are_kept():
     assert angle(first.rotation, second.rotation) > 20
 
 
-def test_planar_poses_lie_before_the_camera_and_are_finite():
+def test_planar_poses_lie_before_the_camera_and_are_finite() -> None:
     points = field(12, 0)
     assert is_flat(points)
     assert not is_flat(field(12, 0.5))
@@ -95,7 +99,7 @@ def test_planar_poses_lie_before_the_camera_and_are_finite():
         assert (((points - pose[1]) @ pose[0].T)[:, 2] > 0).all()
 
 
-def test_a_point_is_where_most_rays_meet():
+def test_a_point_is_where_most_rays_meet() -> None:
     poses = [view(way) for way in ([0, 0, 1], [0.5, 0, 1], [0, 0.5, 1], [-0.5, 0, 1])]
     rotations, positions = (np.array(part) for part in zip(*poses, strict=True))
     point = np.array([0.2, -0.1, 0.3])
@@ -107,7 +111,7 @@ def test_a_point_is_where_most_rays_meet():
     assert met.agrees.tolist() == [True, True, False, True]
 
 
-def test_rays_under_less_than_five_degrees_give_no_point():
+def test_rays_under_less_than_five_degrees_give_no_point() -> None:
     poses = [view([0, 0, 1]), view([0.05, 0, 1])]
     rotations, positions = (np.array(part) for part in zip(*poses, strict=True))
     xy = np.concatenate([seen(np.zeros((1, 3)), pose) for pose in poses])

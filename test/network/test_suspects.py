@@ -1,5 +1,7 @@
 """Control points are tested by each other: simulated misclosures, without photographs."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -41,7 +43,9 @@ def examination(
 
 
 @pytest.mark.parametrize(('surveyed', 'error'), [(0.0, 14), (20 * PRECISION, 600)])
-def test_one_wrong_point_of_eight_is_named_whatever_the_precision_of_the_others(surveyed, error):
+def test_one_wrong_point_of_eight_is_named_whatever_the_precision_of_the_others(
+    surveyed: Any, error: int
+) -> None:
     for seed in range(20):
         random = np.random.default_rng([31, seed])
         found = examination(8, surveyed, error * PRECISION, random)
@@ -53,7 +57,7 @@ def test_one_wrong_point_of_eight_is_named_whatever_the_precision_of_the_others(
         assert max(believed) == pytest.approx(surveyed, rel=0.8, abs=0)
 
 
-def test_points_that_are_exact_but_for_a_small_error_stay_exact():
+def test_points_that_are_exact_but_for_a_small_error_stay_exact() -> None:
     found = examination(8, 0.0, 9 * PRECISION, np.random.default_rng(5))
     assert [it.name for it in found.suspects] == ['control point 0']
     assert not any(it.covariance.any() for it in found.network.control)
@@ -61,7 +65,7 @@ def test_points_that_are_exact_but_for_a_small_error_stay_exact():
 
 
 @pytest.mark.parametrize('surveyed', [0.0, 2 * PRECISION, 20 * PRECISION])
-def test_no_good_point_is_named(surveyed):
+def test_no_good_point_is_named(surveyed: Any) -> None:
     named = sum(
         len(examination(6, surveyed, 0.0, np.random.default_rng([32, seed])).suspects)
         for seed in range(40)
@@ -69,7 +73,7 @@ def test_no_good_point_is_named(surveyed):
     assert named == 0
 
 
-def test_four_points_that_contradict_the_photographs_are_not_said_to_agree():
+def test_four_points_that_contradict_the_photographs_are_not_said_to_agree() -> None:
     found = examination(4, 50 * PRECISION, 0.0, np.random.default_rng(6))
     assert not found.suspects
     (warning,) = found.warnings

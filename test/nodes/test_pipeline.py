@@ -23,7 +23,7 @@ from ahf_ros.scenes.scene import SceneSettings, render
 SCENE = SceneSettings(width=1000, height=700, targets=6, light='stripe', seed=2)
 
 
-def test_places_come_from_the_image_as_received():
+def test_places_come_from_the_image_as_received() -> None:
     """The traditional detector needs a filter here, which moves centres by 0.02 px."""
     scene = render(SCENE)
     settings = assemble(DetectorNodeSettings, {'detector': 'traditional'})

@@ -24,7 +24,7 @@ from ahf_ros.prints.gsi import GSI_LIBRARY
 from ahf_ros.scenes.scene import SceneSettings
 
 
-def test_families_keep_their_order():
+def test_families_keep_their_order() -> None:
     assert list(prints_in('aicon14')) == ['aicon14']
     assert list(prints_in('aicon14, metashape12')) == ['aicon14', 'metashape12']
     several = 'aruco_4x4_250', 'gsi', 'metashape12', 'aruco_4x4_50'
@@ -50,7 +50,7 @@ def test_families_keep_their_order():
         ('metashape12,tag36h9', r"which names 'tag36h9', accepted is apriltag_36h1[01]"),
     ],
 )
-def test_lists_that_make_no_sense_are_refused(text, message):
+def test_lists_that_make_no_sense_are_refused(text: str, message: str) -> None:
     with pytest.raises(ValueError, match=message):
         prints_in(text)
 
@@ -75,7 +75,7 @@ def test_names_may_be_written_as_other_programs_do(text: str, names: tuple[str, 
         assert SceneSettings(family=text, targets=0).family == names[0]
 
 
-def test_ids_that_no_family_has_are_named():
+def test_ids_that_no_family_has_are_named() -> None:
     two = prints_in('metashape12, aicon14').values()
     check_numbers('expected_ids', [1, 161, 500], two)
     with pytest.raises(ValueError) as caught:
@@ -88,7 +88,7 @@ def test_ids_that_no_family_has_are_named():
         check_numbers('expected_ids', range(1, 102), prints_in('dots').values())
 
 
-def test_every_number_is_that_of_a_word():
+def test_every_number_is_that_of_a_word() -> None:
     assert 505 in print_in('gsi').design.all_ids
     for name in ring.FAMILY_NAMES:
         family = ring.family(name)
@@ -96,7 +96,7 @@ def test_every_number_is_that_of_a_word():
         assert len(family.all_ids) == family.words.size
 
 
-def test_every_ring_code_is_another_one_in_a_mirror():
+def test_every_ring_code_is_another_one_in_a_mirror() -> None:
     for name in ('metashape12', 'metashape14', 'aicon12', 'aicon14'):
         family = ring.family(name)
         mirrored = [family.mirrored(int(word)) for word in family.words]

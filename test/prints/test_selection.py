@@ -51,7 +51,9 @@ def test_as_many_pairs_are_confused_as_was_measured(name: str, pairs: int) -> No
     ('name', 'count', 'least'),
     [('metashape12', 20, 2), ('metashape12', 79, 2), ('metashape14', 20, 4), ('dots', 12, 2)],
 )
-def test_selected_words_are_far_apart_and_never_confused(name, count, least) -> None:
+def test_selected_words_are_far_apart_and_never_confused(
+    name: str, count: int, least: int
+) -> None:
     code = dot_family() if name == 'dots' else family(name)
     ids = select_ids(code, code.all_ids, count)
     assert len(set(ids)) == count and ids == sorted(ids)

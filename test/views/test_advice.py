@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
+from pathlib import Path
 
 import cv2
 import numpy as np
@@ -91,7 +92,7 @@ def test_square_markers_in_a_mirror_are_told(family: str) -> None:
     assert lines == ['4 targets of apriltag_36h11 mirrored: flip the images, or print anew']
 
 
-def test_a_family_that_nobody_knows_is_to_be_learnt(tmp_path) -> None:
+def test_a_family_that_nobody_knows_is_to_be_learnt(tmp_path: Path) -> None:
     file = tmp_path / 'mine.yaml'
     file.write_text('family: mine\nbits: 9\nband: [1.6, 2.4]\nwords: all\n')
     image = shown(family='mine', family_file=str(file))
@@ -184,7 +185,9 @@ def test_a_stream_gets_advice_once_and_only_while_nothing_is_identified() -> Non
     assert adviser.lines == []
 
 
-def test_the_command_advises_on_images_without_a_target_only(tmp_path, capsys) -> None:
+def test_the_command_advises_on_images_without_a_target_only(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     for name, family in (('a', 'metashape12'), ('b', 'cct10'), ('c', 'cct10')):
         write_image(tmp_path / f'{name}.png', shown(family=family))
     paths = [tmp_path / f'{name}.png' for name in 'abc']
@@ -197,7 +200,7 @@ def test_the_command_advises_on_images_without_a_target_only(tmp_path, capsys) -
     assert 'dots with a band' not in capsys.readouterr().err
 
 
-def test_the_report_has_the_advice(tmp_path, capsys) -> None:
+def test_the_report_has_the_advice(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     pytest.importorskip('jinja2', reason='pages are written with jinja2')
     write_image(tmp_path / 'a.png', shown(family='cct10'))
     assert status('identify', tmp_path / 'a.png', '--family', 'metashape12', '--json') == 0
@@ -207,7 +210,9 @@ def test_the_report_has_the_advice(tmp_path, capsys) -> None:
     assert '"advice":["12 dots with a band of 10 sectors: --family cct10"]' in page.read_text()
 
 
-def test_a_few_rings_in_each_of_several_images_are_told_together(tmp_path, capsys) -> None:
+def test_a_few_rings_in_each_of_several_images_are_told_together(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     file = tmp_path / 'mine.yaml'
     file.write_text('family: mine\nbits: 9\nband: [1.6, 2.4]\nwords: all\n')
     mine = {'family': 'mine', 'family_file': str(file), 'targets': 4, 'width': 440, 'height': 330}

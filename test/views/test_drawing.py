@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -42,7 +44,7 @@ def shown(image: np.ndarray, colour: tuple[int, int, int]) -> np.ndarray:
     return np.abs(image.astype(int) - colour).max(axis=2) < 60
 
 
-def test_the_image_stays_where_nothing_is_drawn():
+def test_the_image_stays_where_nothing_is_drawn() -> None:
     drawn = draw(GRAY, Identification((target(7),)))
     assert (drawn.shape, drawn.dtype) == ((240, 320, 3), np.uint8)
     assert (drawn[180:] == 120).all()
@@ -50,7 +52,7 @@ def test_the_image_stays_where_nothing_is_drawn():
     assert (GRAY == 120).all()
 
 
-def test_colours_say_what_a_target_is():
+def test_colours_say_what_a_target_is() -> None:
     undecoded, wrong, right = target(UNDECODED, 60.0), target(3, 160.0), target(4, 250.0)
     drawn = overlay(GRAY, (undecoded, wrong, right), wrong=[wrong])
     for colour, x in ((UNDECODED_COLOUR, 60), (WRONG_COLOUR, 160), (DECODED_COLOUR, 250)):
@@ -59,7 +61,7 @@ def test_colours_say_what_a_target_is():
         assert shown(drawn, colour)[140, x] == (colour != UNDECODED_COLOUR)
 
 
-def test_a_missed_target_is_crossed_out():
+def test_a_missed_target_is_crossed_out() -> None:
     drawn = overlay(GRAY, (), missed=[target(3)])
     crossed = shown(drawn, MISSED_COLOUR)
     assert crossed[140, 160]
@@ -106,7 +108,7 @@ def test_squares_are_drawn_as_squares_with_their_number_beside_them() -> None:
     assert np.hypot(left - 210.0, bottom - 70.0) < 8.0
 
 
-def test_pictures_side_by_side_have_their_text_above_them():
+def test_pictures_side_by_side_have_their_text_above_them() -> None:
     remarks = [('two', DECODED_COLOUR), ('a word that is much too long ' * 9, WRONG_COLOUR)]
     row = [Tile(GRAY, 'one', remarks), Tile(draw(GRAY, Identification(())), 'a title ' * 40)]
     made = side_by_side([row, row], 160)
@@ -118,7 +120,7 @@ def test_pictures_side_by_side_have_their_text_above_them():
     assert (made[made.shape[0] // 2 - 60] == 120).any()
 
 
-def test_an_undecoded_target_has_no_label():
+def test_an_undecoded_target_has_no_label() -> None:
     drawn = draw(GRAY, Identification((target(UNDECODED),)))
     other = draw(GRAY, Identification((target(5),)))
     assert (other[100:125, 175:200] != drawn[100:125, 175:200]).any()
@@ -126,7 +128,7 @@ def test_an_undecoded_target_has_no_label():
 
 
 @pytest.mark.parametrize('place', [(2.0, 2.0), (318.0, 238.0), (318.0, 2.0), (-50.0, 900.0)])
-def test_targets_at_the_border_keep_their_label_inside(place):
+def test_targets_at_the_border_keep_their_label_inside(place: tuple[float, float]) -> None:
     drawn = draw(GRAY, Identification((target(88, *place),)))
     assert drawn.shape == (240, 320, 3)
     if 0 <= place[0] < 320:
@@ -136,20 +138,20 @@ def test_targets_at_the_border_keep_their_label_inside(place):
 @pytest.mark.parametrize(
     'image', [GRAY.astype(np.uint16) * 100, np.linspace(0, 1, 76800).reshape(240, 320)]
 )
-def test_images_of_more_bits_are_scaled(image):
+def test_images_of_more_bits_are_scaled(image: Any) -> None:
     image[0, 0] = 0
     drawn = draw(image, Identification(()))
     assert drawn.dtype == np.uint8
     assert drawn.max() == 255
 
 
-def test_lines_grow_with_the_image():
+def test_lines_grow_with_the_image() -> None:
     large = np.full((2656, 3984), 120, np.uint8)
     small = shown(draw(GRAY, Identification((target(7),))), DECODED_COLOUR).sum()
     assert shown(draw(large, Identification((target(7),))), DECODED_COLOUR).sum() > 1.5 * small
 
 
-def test_the_summary_says_how_many_and_through_what():
+def test_the_summary_says_how_many_and_through_what() -> None:
     def told(expected: int = 0, *more: FilterState, **values: object) -> str:
         return summary(Identification((target(7), target(UNDECODED)), expected, *more, **values))
 
@@ -171,13 +173,15 @@ def test_no_size_of_a_target_crashes() -> None:
             assert drawn.shape == (60, 80, 3)
 
 
-def test_labels_of_a_dense_scene_stand_at_their_own_targets(monkeypatch) -> None:
+def test_labels_of_a_dense_scene_stand_at_their_own_targets(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     """Of 150 real targets, side by side, no label lies on a target or on another label."""
     scene = rendered(SceneSettings(width=900, height=650, targets=150, dot_radius=5, seed=3))
     boxes: list[tuple[float, ...]] = []
     named: list[Label] = []
 
-    def placed(labels, sizes, *rest):
+    def placed(labels: Any, sizes: Any, *rest: Any) -> Any:
         corners = place_labels(labels, sizes, *rest)
         for (left, bottom), (width, height) in zip(corners, sizes, strict=True):
             boxes.append((left, bottom - height, left + width, bottom))

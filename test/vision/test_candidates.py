@@ -23,14 +23,14 @@ def voted(gray: np.ndarray, polarities: Sequence[int] = (1,)) -> tuple[np.ndarra
     return np.concatenate(points), np.concatenate([group.polarity for group in groups])
 
 
-def test_an_image_without_edges_has_no_candidates():
+def test_an_image_without_edges_has_no_candidates() -> None:
     points, _ = voted(np.full((60, 80), 40, np.uint8), (1, -1))
     assert points.shape == (0, 2)
 
 
 @pytest.mark.parametrize('radius', [5.0, 9.0, 18.0, 40.0])
 @pytest.mark.parametrize('polarity', [1, -1])
-def test_votes_find_dots_of_all_sizes_under_stripes(radius, polarity):
+def test_votes_find_dots_of_all_sizes_under_stripes(radius, polarity) -> None:
     colours = (220, 40) if polarity == 1 else (40, 220)
     gray = in_stripes(drawn([(150.0, 120.0, radius)], *colours), round(2.2 * radius), 0.4)
     points, polarities = voted(gray, (polarity,))
@@ -40,31 +40,31 @@ def test_votes_find_dots_of_all_sizes_under_stripes(radius, polarity):
 
 @pytest.mark.parametrize('radius', [4.6, 5.6, 6.6])
 @pytest.mark.parametrize('shift', [0.0, 2.3, 4.6, 6.9])
-def test_small_dots_are_placed_between_pixels_under_fine_stripes(radius, shift):
+def test_small_dots_are_placed_between_pixels_under_fine_stripes(radius, shift) -> None:
     points, _ = voted(in_stripes(drawn([(150.3 + shift, 120.4, radius)]), 19, 0.4))
     assert np.linalg.norm(points - (150.3 + shift, 120.4), axis=1).min() < 0.25 * radius
 
 
 @pytest.mark.parametrize('angle', [0.0, 0.4, 1.1, 2.0])
 @pytest.mark.parametrize('aspect', [0.65, 0.5, 0.42])
-def test_votes_find_the_middles_of_oblique_dots_under_stripes(angle, aspect):
+def test_votes_find_the_middles_of_oblique_dots_under_stripes(angle, aspect) -> None:
     points, _ = voted(in_stripes(drawn([(150, 120, 20, 20 * aspect, angle)]), 50, 0.4))
     assert np.linalg.norm(points - (150, 120), axis=1).min() < 0.25 * 20 * aspect**0.5
 
 
 @pytest.mark.parametrize('polarity', [1, -1])
-def test_only_the_polarity_that_is_asked_for_votes(polarity):
+def test_only_the_polarity_that_is_asked_for_votes(polarity) -> None:
     points, _ = voted(drawn([(150.0, 120.0, 12.0)]), (polarity,))
     near = np.linalg.norm(points - (150, 120), axis=1) < 3
     assert near.any() == (polarity == 1)
 
 
-def test_stripes_alone_get_no_votes():
+def test_stripes_alone_get_no_votes() -> None:
     points, _ = voted(in_stripes(drawn([]), 26, 0.2), (1, -1))
     assert len(points) == 0
 
 
-def test_many_bright_spots_do_not_crowd_out_dark_dots(monkeypatch):
+def test_many_bright_spots_do_not_crowd_out_dark_dots(monkeypatch) -> None:
     gray = drawn([(x, y, 8.0) for x in range(20, 200, 30) for y in range(20, 230, 30)], 30, 220)
     gray[:, 200:] = in_stripes(drawn([(230.0, 60.0, 8.0), (280.0, 150.0, 8.0)]), 18, 0.4)[:, 200:]
     edges = image_pyramid(gray, 60.0).edges
@@ -87,25 +87,25 @@ def votes_about(x: float, y: float, plane: int, count: int) -> np.ndarray:
 
 @pytest.mark.parametrize('plane', [0, 1])
 @pytest.mark.parametrize('x', [20.0, 20.3, 20.5, 20.8])
-def test_a_peak_lies_between_cells(plane, x):
+def test_a_peak_lies_between_cells(plane, x) -> None:
     peaks = find_peaks([votes_about(x, 15.4, plane, 400)], SHAPE, 100, 2)
     assert peaks.plane.tolist() == [plane]
     assert (peaks.x[0], peaks.y[0]) == pytest.approx((x, 15.4), abs=0.15)
     assert peaks.votes[0] > 1
 
 
-def test_too_few_votes_make_no_peak():
+def test_too_few_votes_make_no_peak() -> None:
     assert len(find_peaks([votes_about(20, 15, 0, 60)], SHAPE, 100, 2).x) == 0
     assert len(find_peaks([], SHAPE, 100, 2).x) == 0
 
 
-def test_peaks_of_two_planes_do_not_touch():
+def test_peaks_of_two_planes_do_not_touch() -> None:
     parts = [votes_about(20, 37, 0, 300), votes_about(20, 2, 1, 400)]
     peaks = find_peaks(parts, SHAPE, 100, 2)
     assert sorted(peaks.plane.tolist()) == [0, 1]
 
 
-def test_of_neighbours_the_highest_is_kept():
+def test_of_neighbours_the_highest_is_kept() -> None:
     cells = np.array([10 * 60 + 10, 10 * 60 + 12, 10 * 60 + 15])
     assert highest(cells, np.array([2.0, 3.0, 1.0]), (40, 60), 2).tolist() == [False, True, True]
 

@@ -53,7 +53,7 @@ DISC = drawn(dot_frame(*PLACE))
 
 
 @pytest.mark.parametrize('place', [(50.0, 50.0), (50.37, 49.81), (49.5, 50.5)])
-def test_the_centre_and_the_radius_of_a_disc(place):
+def test_the_centre_and_the_radius_of_a_disc(place) -> None:
     fit = fitted(drawn(dot_frame(*place)), dot_frame(51.0, 49.5, 12.7))
     assert centre(fit) == pytest.approx(place, abs=0.005)
     assert frame.ellipse_axes(fit.frames)[0] == pytest.approx([12.0], abs=0.03)
@@ -63,7 +63,7 @@ def test_the_centre_and_the_radius_of_a_disc(place):
     assert fit.deviation[0] < 0.05
 
 
-def test_an_ellipse():
+def test_an_ellipse() -> None:
     shape = frame.affine_frames([50.3], [50.2], [15.0], [8.0], [0.6])
     fit = fitted(drawn(shape), frame.affine_frames([50.0], [50.0], [14.5], [8.5], [0.55]))
     major, minor, angle = frame.ellipse_axes(fit.frames)
@@ -71,7 +71,7 @@ def test_an_ellipse():
     assert (major[0], minor[0], angle[0]) == pytest.approx((15.0, 8.0, 0.6), abs=0.05)
 
 
-def test_circles_of_several_groups_give_the_image_of_the_centre():
+def test_circles_of_several_groups_give_the_image_of_the_centre() -> None:
     """That of the dot's ellipse is 0.1 px beside it; the print is a little off its design."""
     oblique = np.array([[[11.0, 1.5, 60.3], [0.5, 7.0, 59.8], [0.012, -0.01, 1.0]]])
     designed, printed = np.array([1.0, 2.25, 3.5, 4.5]), np.array([1.0, 2.26, 3.49, 4.49])
@@ -100,12 +100,12 @@ def test_circles_of_several_groups_give_the_image_of_the_centre():
     ],
     ids=['even', 'slope', 'edge'],
 )
-def test_light_hardly_moves_the_centre(light, error):
+def test_light_hardly_moves_the_centre(light, error) -> None:
     assert centre(fitted(DISC * light, START)) == pytest.approx(PLACE, abs=error)
 
 
 @pytest.mark.parametrize('colour', [DARK, 110.0, 255.0])
-def test_an_edge_that_is_hidden_is_left_out(colour):
+def test_an_edge_that_is_hidden_is_left_out(colour) -> None:
     """A bar over a quarter of the dot, whatever its colour, has edges that are not the dot's."""
     image = DISC.copy()
     image[:, 57:] = colour
@@ -115,13 +115,13 @@ def test_an_edge_that_is_hidden_is_left_out(colour):
     assert fit.covariance[0, 0, 0] > 1.5 * fitted(DISC, START).covariance[0, 0, 0]
 
 
-def test_where_there_is_no_edge_nothing_is_in_place():
+def test_where_there_is_no_edge_nothing_is_in_place() -> None:
     fit = fitted(np.full((100, 100), 90.0), START)
     assert fit.share[0] == 0
     assert np.isfinite(fit.frames).all()
 
 
-def test_dots_do_not_depend_on_each_other():
+def test_dots_do_not_depend_on_each_other() -> None:
     image = drawn(dot_frame(30.2, 40.1)) + drawn(dot_frame(70.4, 60.3)) - BRIGHT
     starts = [dot_frame(30.0, 40.0), dot_frame(70.0, 60.0)]
     together = fitted(image, np.concatenate(starts))
@@ -134,7 +134,7 @@ def test_dots_do_not_depend_on_each_other():
 
 
 @pytest.mark.parametrize('deviation, least', [(1.0, 1.5), (2.0, 1.4), (6.0, 0.7)])
-def test_the_covariance_is_that_of_the_errors(deviation, least):
+def test_the_covariance_is_that_of_the_errors(deviation, least) -> None:
     """A hundred discs under noise: e' C^-1 e is 2 on average, with a standard error of 0.2.
 
     Strong noise is taken for light that is uneven, which makes the covariance too large.
@@ -151,7 +151,7 @@ def test_the_covariance_is_that_of_the_errors(deviation, least):
     assert least < np.mean(squares) < 2.6
 
 
-def test_edges_of_the_band_alone_do_not_make_a_share():
+def test_edges_of_the_band_alone_do_not_make_a_share() -> None:
     """A band is where it should be, and the dot in its middle is smaller than its print."""
     radii = (0.8, 2.0, 3.0)
     count = 48

@@ -43,7 +43,7 @@ def distances(dots: Dots, rendering) -> np.ndarray:
     )
 
 
-def test_whole_dots_of_a_scene_in_even_light_are_its_targets():
+def test_whole_dots_of_a_scene_in_even_light_are_its_targets() -> None:
     rendering = scene('normal')
     dots = whole_dots(image_pyramid(rendering.image, 60.0), *SIZES, (1,))
     assert distances(dots, rendering).max() < 0.5
@@ -53,7 +53,7 @@ def test_whole_dots_of_a_scene_in_even_light_are_its_targets():
 
 
 @pytest.mark.parametrize('light', ['stripe', 'lattice'])
-def test_votes_find_dots_whose_outlines_are_interrupted(light):
+def test_votes_find_dots_whose_outlines_are_interrupted(light) -> None:
     rendering = scene(light)
     pyramid = image_pyramid(rendering.image, 60.0)
     assert distances(whole_dots(pyramid, *SIZES, (1,)), rendering).max() > 5
@@ -80,7 +80,7 @@ def test_votes_find_dots_whose_outlines_are_interrupted(light):
     ],
     ids=lambda view: ', '.join(map(str, view.values())),
 )
-def test_small_oblique_blurred_and_shaded_dots_are_found(view):
+def test_small_oblique_blurred_and_shaded_dots_are_found(view) -> None:
     few = {'width': 1200, 'height': 900, 'targets': 9}
     rendering = render(SceneSettings(**few, ambient=0.12, seed=4, **view))
     dots = voted_dots(image_pyramid(rendering.image, 60.0), *SIZES, (1,))
@@ -88,7 +88,7 @@ def test_small_oblique_blurred_and_shaded_dots_are_found(view):
     assert (distances(dots, rendering) < 0.25 * sizes).all()
 
 
-def test_edges_within_explained_outlines_do_not_vote():
+def test_edges_within_explained_outlines_do_not_vote() -> None:
     rendering = scene('normal')
     pyramid = image_pyramid(rendering.image, 60.0)
     explained = rendering.targets[0]
@@ -100,7 +100,7 @@ def test_edges_within_explained_outlines_do_not_vote():
 
 
 @pytest.mark.parametrize('level', [40, 200])
-def test_no_dots_in_an_image_of_one_edge_or_none(level):
+def test_no_dots_in_an_image_of_one_edge_or_none(level) -> None:
     gray = np.full((60, 80), 40, np.uint8)
     gray[:, 40:] = level
     pyramid = image_pyramid(gray, 60.0)
@@ -111,7 +111,7 @@ def test_no_dots_in_an_image_of_one_edge_or_none(level):
 
 @pytest.mark.parametrize('polarity', [1, -1])
 @pytest.mark.parametrize(('paper', 'ink'), [(200, 30), (70, 20)], ids=['lit', 'shadow'])
-def test_a_whole_outline_is_an_ellipse(polarity, paper, ink):
+def test_a_whole_outline_is_an_ellipse(polarity, paper, ink) -> None:
     colours = (paper, ink) if polarity == 1 else (ink, paper)
     dots = whole_outlines(first_edges(drawn([(100.3, 80.6, 14.0)], *colours)), 2, 30)
     assert dots.polarity.tolist() == [polarity]
@@ -121,7 +121,7 @@ def test_a_whole_outline_is_an_ellipse(polarity, paper, ink):
     assert (major[0], minor[0]) == pytest.approx((14, 14), abs=1)
 
 
-def test_outlines_of_another_size_are_left_out():
+def test_outlines_of_another_size_are_left_out() -> None:
     edges = first_edges(drawn([(80, 80, 8.0), (200, 120, 24.0)]))
     small = whole_outlines(edges, 2, 7).frames
     large = whole_outlines(edges, 7, 30).frames
@@ -129,7 +129,7 @@ def test_outlines_of_another_size_are_left_out():
     assert frame.enlarged(large, 1)[:, :2, 2] == pytest.approx(np.array([[200, 120]]), abs=0.5)
 
 
-def test_more_dots_than_are_looked_at_are_said_and_the_roundest_stay(monkeypatch):
+def test_more_dots_than_are_looked_at_are_said_and_the_roundest_stay(monkeypatch) -> None:
     places = [(x, y) for x in range(20, 400, 40) for y in range(20, 400, 40)]
     dots = [(x, y, 9, 9 if y < 200 else 6, 0.5) for x, y in places]
     edges = find_edges(log_image(drawn(dots, shape=(400, 400))))

@@ -39,7 +39,7 @@ def test_points_that_ask_for_none_are_neighbours_of_others() -> None:
     assert sorted(second.tolist()) == [0, 2]
 
 
-def test_of_the_same_dot_found_twice_the_one_with_more_of_its_edge_is_kept():
+def test_of_the_same_dot_found_twice_the_one_with_more_of_its_edge_is_kept() -> None:
     frames = frame.affine_frames([50.0, 51.0, 50.0, 80.0], [50.0] * 4, [10, 10, 20, 10], 10.0, 0.0)
     dots = distinct(Dots(frames, np.array([1, 1, 1, 1]), np.array([0.6, 0.9, 0.5, 0.7])))
     assert dots.share.tolist() == [0.9, 0.7, 0.5]  # another size is another dot

@@ -14,7 +14,7 @@ FRAMES = np.array([[[4.0, 0, 10], [0, 3, 20], [0, 0, 1]], [[5.0, 0, 30], [0, 5, 
 COVARIANCE = np.tile(np.eye(2) * 0.01, (2, 1, 1))
 
 
-def test_edge_shifts_that_were_not_measured_are_unknown():
+def test_edge_shifts_that_were_not_measured_are_unknown() -> None:
     ids, codes, confidence = np.array([7, UNDECODED]), np.array([19, 23]), np.array([0.9, 0.1])
     arguments = FRAMES, COVARIANCE, ids, codes, confidence, 'aicon14'
     measured = targets_from_frames(*arguments, np.array([-0.5, math.nan]))
@@ -24,7 +24,7 @@ def test_edge_shifts_that_were_not_measured_are_unknown():
     assert measured[1] == targets_from_frames(*arguments)[1]
 
 
-def test_the_fields_are_those_of_targets_of_other_kinds_as_well():
+def test_the_fields_are_those_of_targets_of_other_kinds_as_well() -> None:
     (fields, _) = ellipse_fields(FRAMES, COVARIANCE, np.array([0.25, 0.5]))
     target = UndecodedTarget(id=UNDECODED, code=0, **fields, reason='unread')
     assert (target.edge_shift, target.covariance) == (0.25, (0.01, 0.0, 0.0, 0.01))

@@ -35,7 +35,7 @@ ELLIPSES = [
 
 @pytest.mark.parametrize('ellipse', ELLIPSES, ids=['round', 'tilted', 'oblique'])
 @pytest.mark.parametrize('polarity', [1, -1])
-def test_a_start_that_is_near_comes_onto_the_edge(ellipse, polarity):
+def test_a_start_that_is_near_comes_onto_the_edge(ellipse, polarity) -> None:
     colours = (210, 30) if polarity == 1 else (30, 210)
     log = log_image(drawn([ellipse], *colours))
     x, y, major, minor, angle = ellipse
@@ -53,7 +53,7 @@ def test_a_start_that_is_near_comes_onto_the_edge(ellipse, polarity):
 
 @pytest.mark.parametrize('blur', [0.5, 2.0])
 @pytest.mark.parametrize('polarity', [1, -1])
-def test_the_size_of_a_dot_does_not_depend_on_its_blur(blur, polarity):
+def test_the_size_of_a_dot_does_not_depend_on_its_blur(blur, polarity) -> None:
     ellipse = (100.3, 90.6, 18.0, 15.0, 0.7)
     gray = drawn([ellipse], *((210, 30) if polarity == 1 else (30, 210)))
     log = log_image(cv2.GaussianBlur(gray, (0, 0), blur))
@@ -62,14 +62,14 @@ def test_the_size_of_a_dot_does_not_depend_on_its_blur(blur, polarity):
 
 
 @pytest.mark.parametrize('angle', [0.0, 0.8, 2.0])
-def test_an_edge_of_light_across_the_dot_moves_it_little(angle):
+def test_an_edge_of_light_across_the_dot_moves_it_little(angle) -> None:
     gray = half_in_shadow(drawn([(100.3, 90.6, 16.0, 14.0, 0.3)]), 104, 92, angle)
     dots = refined(log_image(gray), [(101.0, 90.0, 15.0, 15.0, 0.0)], [1])
     assert dots.share[0] > 0.7
     assert dots.frames[0, :2, 2] == pytest.approx((100.3, 90.6), abs=0.4)
 
 
-def test_what_the_edges_do_not_bear_out_is_left_out():
+def test_what_the_edges_do_not_bear_out_is_left_out() -> None:
     log = log_image(drawn([(60, 60, 12, 12, 0)]))
     start = [(60, 60, 12, 12, 0), (160, 120, 12, 12, 0), (60, 60, 12, 12, 0)]
     dots = refined(log, start, [1, 1, -1])
@@ -77,7 +77,7 @@ def test_what_the_edges_do_not_bear_out_is_left_out():
     assert dots.frames[0, :2, 2] == pytest.approx((60, 60), abs=0.1)
 
 
-def test_nothing_in_nothing_out():
+def test_nothing_in_nothing_out() -> None:
     log = log_image(drawn([(60, 60, 12, 12, 0)]))
     dots = refined(log, [], [])
     assert (dots.frames.shape, dots.polarity.shape, dots.share.shape) == ((0, 3, 3), (0,), (0,))
@@ -85,7 +85,7 @@ def test_nothing_in_nothing_out():
 
 @pytest.mark.parametrize('level', [1, 2])
 @pytest.mark.parametrize('ellipse', ELLIPSES, ids=['round', 'tilted', 'oblique'])
-def test_an_ellipse_is_found_about_a_candidate(ellipse, level):
+def test_an_ellipse_is_found_about_a_candidate(ellipse, level) -> None:
     x, y, major, minor, _ = ellipse
     scale = 2.0**level
     size = np.sqrt(major * minor) / scale
@@ -99,7 +99,7 @@ def test_an_ellipse_is_found_about_a_candidate(ellipse, level):
 
 
 @pytest.mark.parametrize('direction', np.arange(0, 6, 0.7))
-def test_a_circle_is_found_beside_a_candidate(direction):
+def test_a_circle_is_found_beside_a_candidate(direction) -> None:
     x, y = 100.3 + 6 * np.cos(direction), 90.6 + 6 * np.sin(direction)
     candidate = Candidates(1, (np.array([[x, y]]) + 0.5) / 2 - 0.5, (5.8, 11.2), np.array([1]))
     gray = half_in_shadow(drawn([(100.3, 90.6, 13, 13, 0)]), 104, 92, 0.8)
@@ -107,13 +107,13 @@ def test_a_circle_is_found_beside_a_candidate(direction):
     assert dots.frames[0, :2, 2] == pytest.approx((100.3, 90.6), abs=0.6)
 
 
-def test_a_candidate_on_even_ground_has_no_ellipse():
+def test_a_candidate_on_even_ground_has_no_ellipse() -> None:
     candidate = Candidates(1, np.array([[80.0, 20.0]]), (5.8, 11.2), np.array([1]))
     dots = fit_ellipses(image_pyramid(drawn([(60, 60, 12, 12, 0)]), 60.0).logs, [candidate])
     assert len(dots.frames) == len(dots.polarity) == len(dots.share) == 0
 
 
-def test_no_number_of_radii_fills_the_memory():
+def test_no_number_of_radii_fills_the_memory() -> None:
     for number in range(40):
         ellipses._templates(4.0, 5.0 + number)
     assert ellipses._templates.cache_info().currsize <= 16

@@ -25,7 +25,7 @@ def lit(reflectance: np.ndarray, period: int = 24) -> list[np.ndarray]:
 
 
 @pytest.mark.parametrize(('ground', 'ink', 'left'), [(0.8, 0.05, 0.5), (0.05, 0.8, 1.0)])
-def test_seams_go_and_the_print_stays(ground, ink, left):
+def test_seams_go_and_the_print_stays(ground, ink, left) -> None:
     reflectance = np.full((360, 480), ground)
     for x in range(40, 480, 80):
         cv2.circle(reflectance, (x, 180), 24, ink, -1)
@@ -42,14 +42,14 @@ def test_seams_go_and_the_print_stays(ground, ink, left):
     assert contrast[0] == pytest.approx(contrast[1], rel=0.1)
 
 
-def test_even_light_stays_as_it_is():
+def test_even_light_stays_as_it_is() -> None:
     scene = SceneSettings(width=320, height=240, targets=3, dot_radius=8, phases=3)
     images = [render(scene, phase).image.astype(np.float32) / 255 for phase in range(3)]
     largest = np.maximum.reduce(images)
     assert np.abs(even_light(images) / largest - 1).mean() < 0.02
 
 
-def test_one_image_and_black_images_are_no_obstacle():
+def test_one_image_and_black_images_are_no_obstacle() -> None:
     image = render(SceneSettings(width=64, height=48, targets=0)).image.astype(np.float32) / 255
     assert np.isfinite(even_light([image])).all()
     assert np.isfinite(even_light([image, np.zeros_like(image)])).all()

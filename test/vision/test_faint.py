@@ -39,12 +39,12 @@ ROWS, COLUMNS = np.mgrid[:384, :512].astype(np.float32)
     ],
     ids=['clear contrast', 'noise', 'gradient', 'soft spots', 'flat', 'one pixel'],
 )
-def test_nothing_is_stretched_without_clear_edges_of_faint_contrast(gray, noise):
+def test_nothing_is_stretched_without_clear_edges_of_faint_contrast(gray, noise) -> None:
     assert list(faint_parts(noisy(gray, noise))) == []
 
 
 @pytest.mark.parametrize(('paper', 'ink'), [(130, 110), (250, 180), (40, 28), (110, 130)])
-def test_faint_contrast_becomes_that_of_a_print(paper, ink):
+def test_faint_contrast_becomes_that_of_a_print(paper, ink) -> None:
     image = noisy(discs(paper, ink), 0.7)
     (part,) = faint_parts(image)
     assert (part.x, part.y, part.gray.shape) == (0, 0, image.shape)
@@ -56,7 +56,7 @@ def test_faint_contrast_becomes_that_of_a_print(paper, ink):
     assert np.array_equal(same[0].gray, part.gray)
 
 
-def test_only_the_faint_part_of_an_image_is_stretched():
+def test_only_the_faint_part_of_an_image_is_stretched() -> None:
     image = noisy(np.hstack([discs(220, 60), discs(150, 130), discs(220, 60)]), 0.7)
     (part,) = faint_parts(image)
     left, right = part.x, part.x + part.gray.shape[1]
@@ -66,7 +66,7 @@ def test_only_the_faint_part_of_an_image_is_stretched():
     assert part.gray.shape[0] == 384
 
 
-def test_a_hot_pixel_does_not_matter():
+def test_a_hot_pixel_does_not_matter() -> None:
     image = noisy(discs(130, 110), 0.7)
     image[100, 200], image[300, 400] = 255, 0
     (part,) = faint_parts(image)

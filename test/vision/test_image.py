@@ -9,7 +9,7 @@ RAMP = np.arange(20 * 30).reshape(20, 30) % 251
 
 
 @pytest.mark.parametrize('kind', IMAGE_TYPES)
-def test_every_accepted_type_passes_in_any_order_read_only_and_in_the_smallest_size(kind):
+def test_every_accepted_type_passes_in_any_order_read_only_and_in_the_smallest_size(kind) -> None:
     image = RAMP.astype(kind)
     image.flags.writeable = False
     check_image(image[::-1])
@@ -43,6 +43,6 @@ def test_every_accepted_type_passes_in_any_order_read_only_and_in_the_smallest_s
         ((RAMP - 2.5).astype(np.float32), 'down to -2.5'),
     ],
 )
-def test_everything_else_is_refused_by_name(image, words):
+def test_everything_else_is_refused_by_name(image, words) -> None:
     with pytest.raises(ValueError, match=f'^frame .*{words}.*accepted'):
         check_image(image, 'frame')

@@ -34,7 +34,7 @@ LIGHTS = [('normal', 0.3), ('stripe', 0.02), ('lattice', 0.3), ('fringe', 0.3), 
 
 @pytest.mark.lasting
 @pytest.mark.parametrize(('light', 'ambient'), LIGHTS)
-def test_light_that_moves_is_no_movement_and_a_scene_that_moves_is(light, ambient):
+def test_light_that_moves_is_no_movement_and_a_scene_that_moves_is(light, ambient) -> None:
     first, *others = images(light, ambient)
     edges = find_edges(first)
     assert [displacement(edges, other) for other in others] == [None, None]
@@ -44,7 +44,7 @@ def test_light_that_moves_is_no_movement_and_a_scene_that_moves_is(light, ambien
         assert np.hypot(moved.x - x, moved.y - y) < 0.15
 
 
-def test_a_tenth_of_a_pixel_is_seen_in_even_light():
+def test_a_tenth_of_a_pixel_is_seen_in_even_light() -> None:
     first, second, _ = images()
     moved = displacement(find_edges(first), shifted(second, 0.1, 0.0))
     assert moved is not None
@@ -53,7 +53,7 @@ def test_a_tenth_of_a_pixel_is_seen_in_even_light():
     assert str(moved).startswith('0.1')
 
 
-def test_an_object_that_moves_alone_is_noticed():
+def test_an_object_that_moves_alone_is_noticed() -> None:
     first, second, _ = images()
     second = np.hstack([shifted(second, 0.9, 0.0)[:, :320], second[:, 320:]])
     moved = displacement(find_edges(first), second)
@@ -61,7 +61,7 @@ def test_an_object_that_moves_alone_is_noticed():
     assert abs(moved.x - 0.9) < 0.2
 
 
-def test_large_displacements_are_found_in_a_smaller_image():
+def test_large_displacements_are_found_in_a_smaller_image() -> None:
     first, second, _ = images()
     moved = displacement(find_edges(first), shifted(second, 42.0, -25.0))
     assert moved is not None
@@ -76,20 +76,20 @@ def test_large_displacements_are_found_in_a_smaller_image():
     ],
     ids=['fine stripes by half their period', 'a lattice in the dark'],
 )
-def test_light_that_is_like_itself_elsewhere_is_no_movement(changes, phase):
+def test_light_that_is_like_itself_elsewhere_is_no_movement(changes, phase) -> None:
     scene = SceneSettings(**SMALL, **changes)
     first, second = (render(scene, of).image for of in (0, phase))
     assert displacement(find_edges(first), second) is None
 
 
 @pytest.mark.parametrize('size', [(16, 16), (40, 60)])
-def test_images_without_edges_do_not_move(size):
+def test_images_without_edges_do_not_move(size) -> None:
     flat = np.full(size, 90, np.uint8)
     flat[0, 0] = 91
     assert displacement(find_edges(flat), flat) is None
 
 
-def test_other_pixel_types_are_accepted():
+def test_other_pixel_types_are_accepted() -> None:
     first, second, _ = images()
     edges = find_edges(first.astype(np.uint16) * 16)
     assert displacement(edges, second.astype(np.float32)) is None
@@ -114,5 +114,5 @@ def targets(x: float, noise: float) -> list[Target]:
         (Displacement(0.9, 0.1, 0.05, (0, 0, 10, 10)), 0.9, 0.05, None),
     ],
 )
-def test_targets_tell_a_movement_or_too_few_do(moved, shift, noise, told):
+def test_targets_tell_a_movement_or_too_few_do(moved, shift, noise, told) -> None:
     assert targets_moved(moved, targets(0.0, 0.0), targets(shift, noise)) is told

@@ -37,7 +37,7 @@ def measured(image: np.ndarray, blur: float, polarity: int = 1) -> Edges:
 
 @pytest.mark.parametrize('blur', [0.6, 0.8, 1.2])
 @pytest.mark.parametrize('place', [-0.73, 0.0, 0.2, 0.5])
-def test_a_step_is_found_where_it_is(place, blur):
+def test_a_step_is_found_where_it_is(place, blur) -> None:
     edges = measured(step_image(place, blur), blur)
     # Interpolation between pixels is more blur, which tells in a step far from the middle.
     assert edges.offset[0, 0] == pytest.approx(place, abs=0.015 + 0.04 * abs(place))
@@ -46,7 +46,7 @@ def test_a_step_is_found_where_it_is(place, blur):
     assert edges.visible[0, 0]
 
 
-def test_a_step_down_is_found_where_it_is():
+def test_a_step_down_is_found_where_it_is() -> None:
     image = step_image(0.3, 0.8)[:, ::-1]  # now at -0.3, and falling
     edges = measured(np.ascontiguousarray(image), 0.8, polarity=-1)
     assert edges.offset[0, 0] == pytest.approx(-0.3, abs=0.02)
@@ -54,7 +54,7 @@ def test_a_step_down_is_found_where_it_is():
 
 
 @pytest.mark.parametrize('slope', [-0.04, 0.04])
-def test_a_slope_of_the_light_is_seen_and_says_how_far_it_moves_the_step(slope):
+def test_a_slope_of_the_light_is_seen_and_says_how_far_it_moves_the_step(slope) -> None:
     """Without the correction the place is wrong by several times what is left with it."""
     flat = measured(step_image(0.0, 0.9), 0.9)
     edges = measured(step_image(0.0, 0.9, slope), 0.9)
@@ -65,7 +65,7 @@ def test_a_slope_of_the_light_is_seen_and_says_how_far_it_moves_the_step(slope):
     assert abs(moved - edges.sensitivity[0, 0] * seen) < 0.3 * abs(moved)
 
 
-def test_a_step_of_another_blur_says_so_and_hardly_moves():
+def test_a_step_of_another_blur_says_so_and_hardly_moves() -> None:
     soft, sharp = (measured(step_image(0.25, blur), 0.9) for blur in (1.3, 0.6))
     assert soft.softness[0, 0] > 0.15
     assert sharp.softness[0, 0] < -0.1
@@ -73,14 +73,14 @@ def test_a_step_of_another_blur_says_so_and_hardly_moves():
     assert sharp.offset[0, 0] == pytest.approx(0.25, abs=0.05)
 
 
-def test_what_is_no_step_leaves_a_residual():
+def test_what_is_no_step_leaves_a_residual() -> None:
     line = step_image(0.0, 0.8)
     line[:, int(MIDDLE[0]) + 2 :] = DARK
     assert measured(step_image(0.0, 0.8), 0.8).residual[0, 0] < 2
     assert measured(line, 0.8).residual[0, 0] > 8
 
 
-def test_the_curve_of_a_small_circle_is_taken_into_account():
+def test_the_curve_of_a_small_circle_is_taken_into_account() -> None:
     """Blur moves the edge of a disc inwards; the measured place is that of the edge."""
     radius, blur, scale = 5.0, 0.8, 8
     rows, columns = (np.mgrid[: 41 * scale, : 61 * scale] + 0.5) / scale - 0.5
@@ -99,7 +99,7 @@ def test_the_curve_of_a_small_circle_is_taken_into_account():
     assert np.abs(edges.offset).max() < 0.05
 
 
-def test_profiles_beyond_the_image_are_not_visible():
+def test_profiles_beyond_the_image_are_not_visible() -> None:
     frames = frame.affine_frames([2.0], [20.0], [8.0], [8.0], [0.0])
     geometry = edge_points(frames, dot_circles([1], 16))
     edges = measure_outlines(step_image(0, 0.8), geometry, np.array([0.8]), reach=0.45)

@@ -25,7 +25,9 @@ def bounds(low: float, high: float, image: np.ndarray = IMAGE) -> list[tuple[flo
 
 
 @pytest.mark.parametrize('shape', [(300, 1700), (900, 1700), (1700, 900), (17, 1700)])
-def test_every_radius_of_a_dot_that_fits_into_the_image_is_in_an_octave(shape: tuple[int, int]):
+def test_every_radius_of_a_dot_that_fits_into_the_image_is_in_an_octave(
+    shape: tuple[int, int],
+) -> None:
     image = np.resize(IMAGE, shape)
     every = bounds(4.0, 1e4, image)
     assert every[0][0] == 4
@@ -35,7 +37,7 @@ def test_every_radius_of_a_dot_that_fits_into_the_image_is_in_an_octave(shape: t
         assert 0.9 * end < start < end
 
 
-def test_no_dot_of_an_octave_is_larger_than_those_of_the_first():
+def test_no_dot_of_an_octave_is_larger_than_those_of_the_first() -> None:
     for octave in octaves(image_pyramid(IMAGE, 1e4), 4.0, 1e4):
         height, width = (side // 2**octave.level for side in IMAGE.shape)
         assert octave.pyramid.gray.shape == octave.pyramid.logs[0].shape == (height, width)
@@ -47,13 +49,13 @@ def test_no_dot_of_an_octave_is_larger_than_those_of_the_first():
 @pytest.mark.parametrize(
     ('low', 'high', 'count'), [(4.0, 60.0, 1), (4.0, 100.0, 2), (150.0, 160.0, 1), (9.0, 8.0, 0)]
 )
-def test_bounds_are_obeyed(low, high, count):
+def test_bounds_are_obeyed(low, high, count) -> None:
     every = bounds(low, high)
     assert len(every) == count
     assert all(low <= start <= end <= high for start, end in every)
 
 
-def test_the_logarithm_of_bytes_and_of_numbers_is_the_same():
+def test_the_logarithm_of_bytes_and_of_numbers_is_the_same() -> None:
     gray = np.arange(256, dtype=np.uint8).reshape(16, 16)
     log = log_image(gray)
     assert log.dtype == np.int16
@@ -61,7 +63,7 @@ def test_the_logarithm_of_bytes_and_of_numbers_is_the_same():
     assert np.abs(log_image(gray.astype(np.float32)) - log).max() <= 1
 
 
-def test_a_step_is_as_high_in_the_shadow_as_in_the_light():
+def test_a_step_is_as_high_in_the_shadow_as_in_the_light() -> None:
     dark, bright = np.float32([[20, 60]]), np.float32([[100, 220]])
     offset = np.float32(LOG_OFFSET)
     shadow = (np.concatenate([dark, bright]) + offset) * np.float32(0.4) - offset
@@ -70,7 +72,7 @@ def test_a_step_is_as_high_in_the_shadow_as_in_the_light():
 
 
 @pytest.mark.parametrize('shape', [(64, 48), (65, 49), (16, 17)])
-def test_a_pixel_of_the_pyramid_is_the_mean_of_four(shape):
+def test_a_pixel_of_the_pyramid_is_the_mean_of_four(shape) -> None:
     image = np.random.default_rng(0).integers(0, 256, shape).astype(np.uint8)
     first, second, third, _ = halved(image, 3)
     height, width = shape[0] // 2, shape[1] // 2
@@ -82,7 +84,7 @@ def test_a_pixel_of_the_pyramid_is_the_mean_of_four(shape):
     assert np.abs(second - means).max() <= 0.5
 
 
-def test_edges_lie_on_steps_and_point_to_the_bright_side():
+def test_edges_lie_on_steps_and_point_to_the_bright_side() -> None:
     gray = np.full((60, 80), 40, np.uint8)
     gray[:, 41:] = 160
     edges = find_edges(log_image(gray))
@@ -114,7 +116,7 @@ def test_contrast_multiplies_the_steps_of_a_logarithm(contrast: int) -> None:
     assert np.array_equal(edges.strength, multiplied.strength)
 
 
-def test_gray_values_are_those_of_the_image():
+def test_gray_values_are_those_of_the_image() -> None:
     for image in (IMAGE, IMAGE.astype(np.float32)):
         pyramid = image_pyramid(image, 60.0)
         assert pyramid.gray.dtype == np.float32

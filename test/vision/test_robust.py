@@ -9,13 +9,13 @@ from ahf_ros.vision.robust import cauchy, fit_linear, geman_mcclure, geman_mcclu
 from ahf_ros.vision.robust import spread as robust_spread
 
 
-def test_medians_are_those_of_the_selected_values():
+def test_medians_are_those_of_the_selected_values() -> None:
     values = np.array([[5.0, 1, 9, 3], [5, 1, 9, 3], [5, 1, 9, 3]])
     selected = np.array([[1, 1, 1, 0], [1, 1, 1, 1], [0, 0, 0, 0]], bool)
     assert median(values, selected, 7.0).tolist() == [5, 3, 7]  # the lower one of an even number
 
 
-def test_the_spread_of_normal_errors_is_their_deviation_despite_outliers():
+def test_the_spread_of_normal_errors_is_their_deviation_despite_outliers() -> None:
     errors = np.abs(np.random.default_rng(0).normal(0, 2.0, (1, 4000)))
     errors[:, :200] = 1e6
     everything = np.ones_like(errors, bool)
@@ -23,13 +23,13 @@ def test_the_spread_of_normal_errors_is_their_deviation_despite_outliers():
     assert robust_spread(0 * errors, everything, 0.1).tolist() == [[0.1]]
 
 
-def test_weights_at_an_error_of_one():
+def test_weights_at_an_error_of_one() -> None:
     errors = np.array([0.0, 1.0, 100.0])
     assert cauchy(2.0, errors) == pytest.approx([2, 1, 0], abs=1e-3)
     assert geman_mcclure(2.0, errors) == pytest.approx([2, 0.5, 0], abs=1e-3)
 
 
-def test_the_gain_is_the_derivative_of_the_weighted_error():
+def test_the_gain_is_the_derivative_of_the_weighted_error() -> None:
     errors, step = np.linspace(-3, 3, 25), 1e-6
     numeric = (
         (errors + step) * geman_mcclure(1.0, errors + step)
@@ -38,7 +38,7 @@ def test_the_gain_is_the_derivative_of_the_weighted_error():
     assert geman_mcclure_gain(np.ones(25), errors) == pytest.approx(numeric, abs=1e-6)
 
 
-def test_a_linear_model_is_found_despite_outliers():
+def test_a_linear_model_is_found_despite_outliers() -> None:
     generator = np.random.default_rng(0)
     basis = np.stack([np.ones(40), np.linspace(-1, 1, 40)], axis=1)
     true = np.array([[0.2, 0.1], [-0.3, 0.05]])
@@ -50,7 +50,7 @@ def test_a_linear_model_is_found_despite_outliers():
     assert residuals == pytest.approx(values - found @ basis.T)
 
 
-def test_values_without_weight_do_not_count():
+def test_values_without_weight_do_not_count() -> None:
     basis = np.ones((6, 1))
     values = np.array([[1.0, 1, 1, 9, 9, 9]])
     weights = np.array([[1.0, 1, 1, 0, 0, 0]])

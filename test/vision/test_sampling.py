@@ -12,7 +12,7 @@ OBLIQUE = np.array([[[20.0, 3.0, 100.5], [-2.0, 12.0, 80.25], [0.02, -0.01, 1.0]
 ANGLES = np.linspace(0, 2 * np.pi, 24, endpoint=False)
 
 
-def test_samples_of_a_slope_are_those_of_the_slope():
+def test_samples_of_a_slope_are_those_of_the_slope() -> None:
     rows, columns = np.mgrid[:20, :30]
     image = (2 * columns + 3 * rows).astype(np.float32)
     pixels = np.array([[3.25, 4.5], [10.0, 11.75]])
@@ -23,12 +23,12 @@ def test_samples_of_a_slope_are_those_of_the_slope():
     assert lines[0] == pytest.approx([44 - 3.6, 44, 44 + 7.2], abs=0.08)  # cv2.remap: 1/32 px
 
 
-def test_the_border_goes_on_beyond_the_image():
+def test_the_border_goes_on_beyond_the_image() -> None:
     image = np.arange(12, dtype=np.float32).reshape(3, 4)
     assert sample(image, np.array([[-5.0, 0.0], [9.0, 2.0]])).tolist() == [0.0, 11.0]
 
 
-def test_more_lines_than_one_remap_takes():
+def test_more_lines_than_one_remap_takes() -> None:
     image = np.tile(np.arange(40, dtype=np.float32), (20, 1))
     middles = np.stack([np.linspace(5, 35, 40000), np.full(40000, 10.0)], axis=1)
     directions = np.tile([1.0, 0.0], (40000, 1))
@@ -36,7 +36,7 @@ def test_more_lines_than_one_remap_takes():
     assert np.abs(values - middles[:, :1] - [0, 1]).max() < 0.02  # cv2.remap: 1/32 px
 
 
-def test_circles_are_sampled_where_they_are_projected():
+def test_circles_are_sampled_where_they_are_projected() -> None:
     rows, columns = np.mgrid[:160, :200]
     image = (columns + 0.5 * rows).astype(np.float32)
     radii = np.array([0.5, 1.0, 2.0])
@@ -45,6 +45,6 @@ def test_circles_are_sampled_where_they_are_projected():
     assert sampled == pytest.approx(projected, abs=0.02)
 
 
-def test_what_lies_in_an_image():
+def test_what_lies_in_an_image() -> None:
     pixels = np.array([[0.0, 0.0], [29.0, 19.0], [29.1, 5.0], [5.0, -0.1]])
     assert within(pixels, (20, 30)).tolist() == [True, True, False, False]

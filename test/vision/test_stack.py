@@ -21,11 +21,11 @@ def both(**options) -> ImageStack:
     return ImageStack((lit(0, **options), lit(1, **options)))
 
 
-def test_the_largest_values_show_the_print_in_full_light():
+def test_the_largest_values_show_the_print_in_full_light() -> None:
     assert np.array_equal(both().combined('largest'), REFLECTANCE)
 
 
-def test_means_are_of_light_or_of_gray():
+def test_means_are_of_light_or_of_gray() -> None:
     stack = both()
     gray = np.rint((lit(0).astype(float) + lit(1)) / 2)
     assert np.array_equal(stack.combined('mean_gray'), gray)
@@ -34,7 +34,7 @@ def test_means_are_of_light_or_of_gray():
     assert np.abs(stack.combined('mean_light') - expected).max() <= 0.51
 
 
-def test_the_quotient_shows_what_shines_in_one_of_the_lights():
+def test_the_quotient_shows_what_shines_in_one_of_the_lights() -> None:
     dark = np.tile(np.arange(30, 50, dtype=np.uint8), (20, 1))
     bright = dark.copy()
     bright[5:10, 5:10] = 240
@@ -47,7 +47,7 @@ def test_the_quotient_shows_what_shines_in_one_of_the_lights():
     ('kind', 'white'), [(np.uint16, 4095), (np.float32, 3.0), (np.float64, 7e5)]
 )
 @pytest.mark.parametrize('name', ['even_light', 'largest', 'mean_light', 'mean_gray'])
-def test_combinations_have_the_pixels_of_the_images(kind, white, name):
+def test_combinations_have_the_pixels_of_the_images(kind, white, name) -> None:
     images = tuple((lit(phase) / 255 * white).astype(kind) for phase in (0, 1))
     combined = ImageStack(images).combined(name)
     assert combined.dtype == kind
@@ -55,7 +55,7 @@ def test_combinations_have_the_pixels_of_the_images(kind, white, name):
 
 
 @pytest.mark.parametrize('name', COMBINATIONS)
-def test_the_order_of_the_images_and_their_memory_do_not_matter(name):
+def test_the_order_of_the_images_and_their_memory_do_not_matter(name) -> None:
     first, second = lit(0), np.asfortranarray(lit(1))
     combined = ImageStack((first, second)).combined(name)
     assert combined.flags.c_contiguous
@@ -63,14 +63,14 @@ def test_the_order_of_the_images_and_their_memory_do_not_matter(name):
     assert np.abs(combined.astype(int) - turned).max() <= 1
 
 
-def test_one_image_is_its_own_combination():
+def test_one_image_is_its_own_combination() -> None:
     image = lit(0)
     stack = ImageStack((image,))
     assert stack.names == ('',)
     assert stack.combined('') is image
 
 
-def test_averaging_reduces_noise():
+def test_averaging_reduces_noise() -> None:
     generator = np.random.default_rng(0)
     clean = cv2.GaussianBlur(np.tile(REFLECTANCE, (3, 2)), (0, 0), 3).astype(float)
     images = [clean + generator.normal(0, 4, clean.shape) for _ in range(16)]
@@ -96,11 +96,11 @@ def test_averaging_reduces_noise():
         ((lit(0)[0],), r'image has shape \(32,\)'),
     ],
 )
-def test_images_that_do_not_fit_are_named(images, message):
+def test_images_that_do_not_fit_are_named(images, message) -> None:
     with pytest.raises(ValueError, match=message):
         ImageStack(images)
 
 
-def test_an_unknown_combination_is_refused():
+def test_an_unknown_combination_is_refused() -> None:
     with pytest.raises(ValueError, match="combination is 'sum', accepted is one of even_light"):
         both().combined('sum')
