@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 
 from ahf_ros.base.target import TrueTarget
 from benchmarks.auto import farthest, main
@@ -15,7 +16,7 @@ def test_targets_are_compared_by_their_ids() -> None:
     assert farthest(named, []) == 0
 
 
-def test_a_family_is_the_same_as_auto(tmp_path) -> None:
+def test_a_family_is_the_same_as_auto(tmp_path: Path) -> None:
     file = tmp_path / 'auto.json'
     options = ['--seeds', '7', '--families', 'aicon12', '--lights', 'normal', '--targets', '4']
     assert main([*options, '--json', str(file)]) == 0

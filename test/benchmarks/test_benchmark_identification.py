@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -14,7 +15,9 @@ from benchmarks.rows import normalised_squares
 NORMAL = ('--quick', '--lights', 'normal', '--groups', 'light')
 
 
-def test_a_detector_and_the_same_one_as_a_command(tmp_path, capsys) -> None:
+def test_a_detector_and_the_same_one_as_a_command(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     command = f'{sys.executable} -m ahf_ros.cli identify --json --family {{family}}'
     rows = []
     for number, method in enumerate([('--detector', 'traditional'), ('--command', command)]):
@@ -36,7 +39,9 @@ def test_a_detector_and_the_same_one_as_a_command(tmp_path, capsys) -> None:
     assert other['seconds'] > 0
 
 
-def test_seeds_for_tests_and_for_development_are_kept_apart(capsys) -> None:
+def test_seeds_for_tests_and_for_development_are_kept_apart(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
     with pytest.raises(SystemExit, match='2'):
         identification.main([*NORMAL, '--seeds', '1', '101'])
     assert 'accepted are all below 101 or none' in capsys.readouterr().err

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,7 +14,7 @@ from benchmarks import limits
 
 @pytest.mark.parametrize('family', ['metashape12', 'gsi', 'dots'])
 @pytest.mark.parametrize('setting', limits.SETTINGS)
-def test_every_row_is_a_scene_that_can_be_made(family, setting) -> None:
+def test_every_row_is_a_scene_that_can_be_made(family: str, setting: Any) -> None:
     options = ['--family', family, '--targets', '50', '--setting', setting]
     for group, count, twice in (('light', 32, 0), ('edge shift', 64, 8), ('exposure', 6, 0)):
         made = limits.parser().parse_args([*options, '--group', group])
@@ -32,13 +34,13 @@ def test_the_halves_of_an_image_may_be_shifted_in_opposite_directions() -> None:
     assert (both[:, middle:] < 128).sum() > 1.2 * (less[:, middle:] < 128).sum()
 
 
-def test_rows_of_other_groups_are_refused(capsys) -> None:
+def test_rows_of_other_groups_are_refused(capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit):
         limits.main(['--group', 'exposure', '--rows', 'radius 6, 0.3'])
     assert "accepted are those of the group 'exposure'" in capsys.readouterr().err
 
 
-def test_files_hold_what_is_printed(tmp_path, capsys) -> None:
+def test_files_hold_what_is_printed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     output = tmp_path / 'limits_0.12'
     some = ['--rows', 'radius 10, 0.12', '--lights', 'stripe', '--targets', '4', '--seeds', '1']
     assert limits.main([*some, '--detector', 'traditional', '--output', str(output)]) == 0

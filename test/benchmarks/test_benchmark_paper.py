@@ -26,7 +26,7 @@ def printed(*arguments: object) -> str:
 
 
 @pytest.fixture(scope='module')
-def measured(tmp_path_factory) -> tuple[str, Path]:
+def measured(tmp_path_factory: pytest.TempPathFactory) -> tuple[str, Path]:
     path = tmp_path_factory.mktemp('paper') / 'paper.json'
     return printed(*SMALL.split(), '--json', path), path
 
@@ -37,7 +37,7 @@ def row(text: str, name: str) -> list[str]:
     return [cell.strip() for cell in line.split('|')[2:-1]]
 
 
-def test_the_figures_of_the_paper_stand_beside_ours(measured) -> None:
+def test_the_figures_of_the_paper_stand_beside_ours(measured: tuple[str, Path]) -> None:
     text, _ = measured
     assert row(text, 'AHF-TI in the paper') == [
         '63 / 68 / 68 (0.263)',
@@ -49,7 +49,7 @@ def test_the_figures_of_the_paper_stand_beside_ours(measured) -> None:
     assert float(plain.split('/')[1]) < 50 < float(driven.split('/')[1].split()[0])
 
 
-def test_every_method_is_in_the_json(measured) -> None:
+def test_every_method_is_in_the_json(measured: tuple[str, Path]) -> None:
     text, path = measured
     records = json.loads(path.read_text())['records']
     names = {record['method'] for record in records}
@@ -63,7 +63,7 @@ def test_every_method_is_in_the_json(measured) -> None:
     assert f'{striped["seconds"]:.2f}' in text
 
 
-def test_plots_come_from_an_earlier_run(measured, tmp_path) -> None:
+def test_plots_come_from_an_earlier_run(measured: tuple[str, Path], tmp_path: Path) -> None:
     pytest.importorskip('matplotlib')
     text, path = measured
     assert printed('--read', path, '--plots', tmp_path / 'plots') == text

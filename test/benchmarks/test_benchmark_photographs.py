@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import subprocess
+from pathlib import Path
+from typing import Any
 
 import cv2
 import pytest
@@ -24,7 +26,7 @@ def test_the_truth_names_pictures_and_families_that_can_be_read() -> None:
 
 
 @pytest.fixture
-def clone(tmp_path):
+def clone(tmp_path: Path) -> tuple[Path, dict[str, Any]]:
     """A folder with a repository of one picture, and what it shows."""
     scene = render(SceneSettings(width=480, height=360, targets=3, dot_radius=9))
     repository = tmp_path / 'somebody' / 'pictures'
@@ -46,7 +48,7 @@ def clone(tmp_path):
     }
 
 
-def test_a_picture_is_read_from_its_clone_and_scored(clone) -> None:
+def test_a_picture_is_read_from_its_clone_and_scored(clone: tuple[Path, dict[str, Any]]) -> None:
     folder, shown = clone
     image = strangers.picture(folder, shown)
     record = photographs.record(image, shown, photographs.WAYS)
@@ -57,7 +59,9 @@ def test_a_picture_is_read_from_its_clone_and_scored(clone) -> None:
     assert (by['right'], by['false'], by['missed']) == (0, 3, [moved['targets'][0][0]])
 
 
-def test_a_picture_that_is_not_there_says_what_to_clone(clone, capsys) -> None:
+def test_a_picture_that_is_not_there_says_what_to_clone(
+    clone: tuple[Path, dict[str, Any]], capsys: pytest.CaptureFixture[str]
+) -> None:
     folder, shown = clone
     with pytest.raises(ValueError, match=r'no other\.png.*github\.com/somebody/pictures'):
         strangers.picture(folder, {**shown, 'path': 'other.png', 'blob': '0' * 40})

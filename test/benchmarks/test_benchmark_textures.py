@@ -1,12 +1,15 @@
 """The benchmark of images without targets."""
 
 import json
+from pathlib import Path
+
+import pytest
 
 from benchmarks.textures import main
 from support.pictures.textures import lookalikes, textured_image
 
 
-def test_textures_show_no_rings(capsys, tmp_path) -> None:
+def test_textures_show_no_rings(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     file = tmp_path / 'figures.json'
     options = ['--seed', '7', '--count', '2', '--family', 'metashape12', '--only', 'textures']
     assert main([*options, '--json', str(file)]) == 0

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -31,7 +33,7 @@ def drawn(occluder: Occluder, seed: int = 2) -> tuple[np.ndarray, np.ndarray]:
 
 
 @pytest.mark.parametrize('name', ['metashape12', 'aicon14', 'aruco_4x4_50'])
-def test_the_truth_is_where_the_marks_are(name) -> None:
+def test_the_truth_is_where_the_marks_are(name: str) -> None:
     sheet = target_sheet(name, np.array([5, 6, 7]), 1, columns=2)
     image = 220.0 - sheet.photograph(Exposure())
     side = cell_pixels(RADIUS)
@@ -86,7 +88,7 @@ def test_bright_targets_are_dark_ones_inverted() -> None:
 
 
 @pytest.mark.parametrize('whole', [False, True])
-def test_a_wedge_covers_its_sectors_and_nothing_else(whole) -> None:
+def test_a_wedge_covers_its_sectors_and_nothing_else(whole: bool) -> None:
     share, gray = drawn(occluders.over_sectors(2, 99.0, whole=whole))
     assert gray == 99.0
     assert share[DISTANCE < 1.15].max() == 0
@@ -185,7 +187,7 @@ def test_counts_say_what_is_certain_and_wrong() -> None:
     assert str(count) == '1 / 1 + 1 (1)'
 
 
-def test_tables_of_a_few_targets(capsys, tmp_path) -> None:
+def test_tables_of_a_few_targets(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     arguments = ['--tables', 'disturbances', '--families', 'metashape12', '--count', '6']
     arguments += ['--rows', 'clean', 'border', '--json', str(tmp_path / 'table.json')]
     assert disturbances.main(arguments) == 0

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import warnings
 from functools import cache
+from typing import Any
 
 import cv2
 import numpy as np
@@ -100,7 +101,7 @@ def test_a_constant_image_is_refused(detector: str, family: str, gray: int) -> N
 
 @every_detector
 @pytest.mark.parametrize('make', [saturated, moire, many_dots, page])
-def test_what_shows_no_target_is_left_alone(detector: str, family: str, make) -> None:
+def test_what_shows_no_target_is_left_alone(detector: str, family: str, make: Any) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter('error')
         found = create_detector(detector, family=family)(make())

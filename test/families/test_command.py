@@ -9,6 +9,7 @@ import time
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -20,7 +21,7 @@ from ahf_ros.identification.session import identify
 IMAGE = np.arange(400, dtype=np.uint8).reshape(20, 20)
 
 
-def detector(tmp_path, script: str, words: str = '', timeout: float = 600.0):
+def detector(tmp_path: Path, script: str, words: str = '', timeout: float = 600.0) -> Any:
     """Return the detector that runs a Python script."""
     path = tmp_path / 'program.py'
     path.write_text(script)
@@ -32,7 +33,7 @@ def printing(text: str) -> str:
     return f'print({text!r})'
 
 
-def test_what_a_program_prints_is_what_was_identified(tmp_path) -> None:
+def test_what_a_program_prints_is_what_was_identified(tmp_path: Path) -> None:
     found = detector(
         tmp_path,
         'import cv2, json, sys\n'
@@ -46,7 +47,7 @@ def test_what_a_program_prints_is_what_was_identified(tmp_path) -> None:
     assert found[1].angle == 0.5
 
 
-def test_the_path_goes_where_the_command_says(tmp_path) -> None:
+def test_the_path_goes_where_the_command_says(tmp_path: Path) -> None:
     script = 'import sys; assert sys.argv[1].endswith(".png"); assert sys.argv[2] == "last"\n'
     assert detector(tmp_path, script + printing('{"targets": []}'), '{image} last')(IMAGE) == []
 
@@ -71,13 +72,15 @@ def test_the_path_goes_where_the_command_says(tmp_path) -> None:
         ),
     ],
 )
-def test_what_is_not_accepted_is_named(tmp_path, script, message) -> None:
+def test_what_is_not_accepted_is_named(tmp_path: Path, script: str, message: str) -> None:
     with pytest.raises(ValueError, match=r'^command .*program\.py') as caught:
         detector(tmp_path, script)(IMAGE)
     assert message in str(caught.value)
 
 
-def test_a_program_that_hangs_is_ended_with_all_that_it_started(tmp_path, monkeypatch) -> None:
+def test_a_program_that_hangs_is_ended_with_all_that_it_started(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     pid = tmp_path / 'pid'
     # The time limit is over once the program has got that far, however slow the machine is.
     clock = SimpleNamespace(monotonic=lambda: 3.0 if pid.exists() else 0.0)
@@ -98,14 +101,16 @@ def test_a_program_that_hangs_is_ended_with_all_that_it_started(tmp_path, monkey
         time.sleep(0.1)
 
 
-def test_a_program_that_writes_without_end_is_ended(tmp_path, monkeypatch) -> None:
+def test_a_program_that_writes_without_end_is_ended(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(module, 'MAXIMUM_OUTPUT', 2**20)
     script = 'import os\nwhile True:\n    os.write(1, bytes(2**16))\n'
     with pytest.raises(ValueError, match='bytes, accepted are at most 1048576'):
         detector(tmp_path, script)(IMAGE)
 
 
-def test_a_program_ends_with_all_that_it_started_in_sessions_of_their_own(tmp_path) -> None:
+def test_a_program_ends_with_all_that_it_started_in_sessions_of_their_own(tmp_path: Path) -> None:
     pid = tmp_path / 'pid'
     script = (
         'import subprocess, sys\n'
@@ -121,7 +126,9 @@ def test_a_program_ends_with_all_that_it_started_in_sessions_of_their_own(tmp_pa
 
 
 @pytest.mark.parametrize('when', ['before', 'meanwhile'])
-def test_a_temporary_folder_that_vanishes_is_named(tmp_path, monkeypatch, when) -> None:
+def test_a_temporary_folder_that_vanishes_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, when: str
+) -> None:
     scratch = tmp_path / 'scratch'
     scratch.mkdir()
     monkeypatch.setattr('tempfile.tempdir', str(scratch))
@@ -133,7 +140,9 @@ def test_a_temporary_folder_that_vanishes_is_named(tmp_path, monkeypatch, when) 
         made(IMAGE)
 
 
-def test_a_temporary_folder_that_is_full_is_named(tmp_path, monkeypatch) -> None:
+def test_a_temporary_folder_that_is_full_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr('tempfile.tempdir', str(tmp_path))
     limits = resource.getrlimit(resource.RLIMIT_FSIZE)
     image = np.random.default_rng(0).integers(0, 255, (300, 300), np.uint8)
@@ -164,12 +173,14 @@ def _runs(pid: int) -> bool:
         ('/nowhere/nothing', 'cannot be started: No such file'),
     ],
 )
-def test_a_command_that_is_none(command, message) -> None:
+def test_a_command_that_is_none(command: str, message: str) -> None:
     with pytest.raises(ValueError, match=message):
         create_detector('command', command=command)(IMAGE)
 
 
-def test_several_threads_at_once_and_no_file_left(tmp_path, monkeypatch) -> None:
+def test_several_threads_at_once_and_no_file_left(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setenv('TMPDIR', str(tmp_path))
     monkeypatch.setattr('tempfile.tempdir', None)
     script = (
@@ -185,7 +196,7 @@ def test_several_threads_at_once_and_no_file_left(tmp_path, monkeypatch) -> None
     assert [path.name for path in tmp_path.iterdir()] == ['program.py']
 
 
-def test_a_program_behind_the_adaptive_filter(tmp_path) -> None:
+def test_a_program_behind_the_adaptive_filter(tmp_path: Path) -> None:
     """It identifies one target only in images that are not the one received."""
     script = (
         'import cv2, json, sys\n'

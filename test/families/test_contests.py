@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -28,7 +29,9 @@ def hypotheses(places: list[float], odds: list[float]) -> Hypotheses:
     )
 
 
-def resolved(places, odds, ids, confidence):
+def resolved(
+    places: Any, odds: Any, ids: list[int], confidence: Any
+) -> tuple[list[int], list[bool]]:
     found = replace(hypotheses(places, odds), confidence=np.array(confidence, float))
     kept, certain = resolve(found, np.array(ids))
     return np.flatnonzero(kept).tolist(), certain.tolist()
@@ -49,7 +52,9 @@ SURE, FIRST = [True, True], [True, False]
         pytest.param(APART, [30, 29], [1, 1], FIRST, [0, 1], FIRST, id='an uncertain claim'),
     ],
 )
-def test_readings_that_contradict_each_other(places, odds, ids, confidence, kept, certain) -> None:
+def test_readings_that_contradict_each_other(
+    places: Any, odds: list[int], ids: list[int], confidence: Any, kept: list[int], certain: Any
+) -> None:
     assert resolved(places, odds, ids, confidence) == (kept, certain)
 
 
@@ -79,7 +84,7 @@ def test_sectors_of_a_band_that_was_read_are_no_dots() -> None:
     ],
 )
 def test_of_two_targets_whose_bands_overlap_only_the_surer_one_is_certain(
-    apart, confidence, on_top
+    apart: int, confidence: list[float], on_top: list[bool]
 ) -> None:
     places = [50, 50 + apart]
     assert resolved(places, [90, 80], [1, 2], confidence)[1] == on_top

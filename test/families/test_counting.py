@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import cv2
 import numpy as np
@@ -18,7 +19,7 @@ SMALL = SceneSettings(width=800, height=560, targets=6, seed=12)
 RINGS = DetectorSettings(family=SMALL.family)
 
 
-def scene(**changes) -> Rendering:
+def scene(**changes: Any) -> Rendering:
     return rendered(replace(SMALL, **changes))
 
 
@@ -42,13 +43,13 @@ def scene(**changes) -> Rendering:
         {'tilt': 45.0, 'focal_length': 3.0},
     ],
 )
-def test_the_count_is_right_under_any_light_and_for_targets_of_any_kind(changes) -> None:
+def test_the_count_is_right_under_any_light_and_for_targets_of_any_kind(changes: Any) -> None:
     shown = scene(**changes)
     assert estimate_count(shown.image, DetectorSettings(family=shown.settings.family)) == 6
 
 
 @pytest.mark.parametrize('light', ['normal', 'stripe', 'lattice'])
-def test_none_is_counted_where_there_is_none(light) -> None:
+def test_none_is_counted_where_there_is_none(light: str) -> None:
     assert estimate_count(scene(targets=0, distractors=10, light=light, seed=13).image, RINGS) == 0
 
 
@@ -57,7 +58,7 @@ RAMP = np.arange(200, dtype=np.uint8) + np.zeros((150, 1), np.uint8)
 
 
 @pytest.mark.parametrize('image', [NOISE, RAMP], ids=['noise', 'a ramp without any dots'])
-def test_what_shows_no_target_has_none(image) -> None:
+def test_what_shows_no_target_has_none(image: np.ndarray) -> None:
     assert estimate_count(image, RINGS) == 0
 
 
@@ -80,12 +81,12 @@ def test_radii_and_polarity_bound_what_counts() -> None:
 
 
 @pytest.mark.parametrize('kind', [np.uint16, np.float32])
-def test_images_of_more_bits_are_counted(kind) -> None:
+def test_images_of_more_bits_are_counted(kind: Any) -> None:
     assert estimate_count(scene().image.astype(kind) * 4, RINGS) == 6
 
 
 @pytest.mark.parametrize(('paper', 'ink'), [(200, 20), (20, 200)])
-def test_dots_without_a_band_are_no_targets(paper, ink) -> None:
+def test_dots_without_a_band_are_no_targets(paper: int, ink: int) -> None:
     image = np.full((400, 600), paper, np.uint8)
     for x, radius in zip(range(80, 600, 110), (6, 9, 12, 16, 20), strict=True):
         cv2.circle(image, (x, 200), radius, ink, -1, cv2.LINE_AA)

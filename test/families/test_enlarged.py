@@ -37,7 +37,9 @@ def readings(image: np.ndarray) -> dict[int, Hypotheses]:
     ('radius', 'light', 'most'),
     [(6.0, 'normal', 1.05), (6.0, 'stripe', 1.25), (10.0, 'normal', 1.05)],
 )
-def test_a_picture_enlarged_twice_shows_as_much_of_what_is_typical(radius, light, most) -> None:
+def test_a_picture_enlarged_twice_shows_as_much_of_what_is_typical(
+    radius: float, light: str, most: float
+) -> None:
     """Of each target within 5 or 25 %; log odds themselves are held to what they are today.
 
     They should stay within 25 %, too, but those of dots below 20 px are sums over as many samples
@@ -67,7 +69,7 @@ def test_large_targets_keep_their_log_odds_where_a_picture_is_enlarged() -> None
 
 
 @pytest.mark.parametrize('light', ['normal', 'stripe'])
-def test_the_same_ids_where_dots_are_reduced_to_ten_pixels(light) -> None:
+def test_the_same_ids_where_dots_are_reduced_to_ten_pixels(light: str) -> None:
     image = rendering(**SIZE, dot_radius=20.0, light=light, ambient=0.3).image
     found = set(readings(image))
     assert len(found) == 8
@@ -76,7 +78,7 @@ def test_the_same_ids_where_dots_are_reduced_to_ten_pixels(light) -> None:
 
 
 @pytest.mark.parametrize('radius', [6.0, 10.0])
-def test_a_halo_of_sharpening_in_an_enlarged_picture_is_no_arc(radius) -> None:
+def test_a_halo_of_sharpening_in_an_enlarged_picture_is_no_arc(radius: float) -> None:
     gray = resized(rendering(**SIZE, dot_radius=radius).image, 2).astype(np.float32)
     halo = 2.5 * gray - 1.5 * cv2.GaussianBlur(gray, (0, 0), 2.5)
     found = readings(np.clip(halo, 0, 255).astype(np.uint8))

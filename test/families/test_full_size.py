@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -40,12 +42,14 @@ def check(shown: Collage, family: str) -> None:
         pytest.param(SQUARE, [150.0, 20.0, 6.0], SQUARE, marks=needs_square_markers),
     ],
 )
-def test_dots_of_any_size_in_one_image(printed, radii, read) -> None:
+def test_dots_of_any_size_in_one_image(printed: Any, radii: list[float], read: Any) -> None:
     check(collage(radii, printed, seed=5 if read == VENDORS else 0), read)
 
 
 @pytest.mark.parametrize(('light', 'polarity'), [('stripe', 'bright'), ('lattice', 'dark')])
-def test_large_dots_in_projected_light_that_are_seen_from_the_side(light, polarity) -> None:
+def test_large_dots_in_projected_light_that_are_seen_from_the_side(
+    light: str, polarity: str
+) -> None:
     shown = collage(
         [150.0, 65.0, 20.0], light=light, ambient=0.12, tilt=40.0, polarity=polarity, seed=3
     )
@@ -77,7 +81,9 @@ def test_limits_are_obeyed_at_every_size() -> None:
     ],
     ids=['oblique', 'soft', 'under fringes', 'gsi', 'dots'],
 )
-def test_centres_are_as_right_as_they_say(changes, missed, deviation, least) -> None:
+def test_centres_are_as_right_as_they_say(
+    changes: Any, missed: int, deviation: float, least: float
+) -> None:
     scene = render(
         SceneSettings(**{'width': 1400, 'height': 1000, 'blur': 2, 'seed': 31} | changes)
     )

@@ -30,7 +30,9 @@ def survey(numbers: list[int], scale: float, noise: float, seed: int = 1) -> dic
     for number in numbers:
         turn, place = rotation(generator), generator.uniform(-5000, 5000, 3)
 
-        def measured(point: np.ndarray, turn: np.ndarray = turn, place: np.ndarray = place):
+        def measured(
+            point: np.ndarray, turn: np.ndarray = turn, place: np.ndarray = place
+        ) -> np.ndarray:
             there = turn @ (scale * np.append(point, 0.0)) + place
             return there + generator.normal(0, noise, 3)
 

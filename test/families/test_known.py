@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -107,13 +109,13 @@ IMAGE = np.zeros((8, 8), np.uint8)
 PAPER_ON_PAPER = Exposure(occluder=occluders.over_sectors(2, 220.0, whole=True))
 
 
-def kinds(targets, truth):
+def kinds(targets: Any, truth: Any) -> list[str]:
     """Return which reports are right, wrong and false."""
     return [verdict.kind for verdict in judge(truth, targets)]
 
 
 @pytest.fixture(scope='module')
-def covered():
+def covered() -> Any:
     """Return photographs of targets under paper, their truth, and what is read without IDs."""
     sheets = [target_sheet(CODE.name, IDS, seed) for seed in (31, 32, 33)]
     shown = [(sheet.photograph(PAPER_ON_PAPER), sheet.truth) for sheet in sheets]
@@ -134,7 +136,7 @@ def test_no_two_ids_chosen_far_apart_look_alike_where_sectors_are_covered() -> N
 
 
 @pytest.mark.lasting
-def test_paper_on_paper_turns_one_id_into_another_unless_they_are_known(covered) -> None:
+def test_paper_on_paper_turns_one_id_into_another_unless_they_are_known(covered: Any) -> None:
     assert any(WRONG in blind for _, _, blind in covered)  # no trace is left to see
     informed = create_detector('ring', family='metashape12').expecting(frozenset(IDS))
     read = [kind for image, truth, _ in covered for kind in kinds(informed(image), truth)]
@@ -142,7 +144,7 @@ def test_paper_on_paper_turns_one_id_into_another_unless_they_are_known(covered)
 
 
 @pytest.mark.parametrize('name', ['expected_ids', 'network_ids'])
-def test_ids_that_are_given_reach_the_detector(covered, name) -> None:
+def test_ids_that_are_given_reach_the_detector(covered: Any, name: str) -> None:
     image, truth = next((image, truth) for image, truth, blind in covered if WRONG in blind)
     given = {name: ','.join(map(str, IDS))}
     identifier = create_identifier(family='metashape12', ahf=False, **given)
@@ -163,13 +165,13 @@ class Plugin:
 
     name, family = 'mine', 'metashape12'
 
-    def __init__(self, ids=()) -> None:
+    def __init__(self, ids: Iterable[int] = ()) -> None:
         self.ids = ids
 
-    def __call__(self, image):
+    def __call__(self, image: np.ndarray) -> list[Target]:
         return [Target(number, 1, 4.0, 4.0, 2.0, 2.0) for number in sorted(self.ids)]
 
-    def expecting(self, ids):
+    def expecting(self, ids: list[int]) -> Any:
         if 13 in ids:
             raise RuntimeError('not that one')
         return Plugin(ids)

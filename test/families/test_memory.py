@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tracemalloc
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ from ahf_ros.vision.image import as_gray
 from support.scenes import rendering
 
 
-def peak_of(work) -> int:
+def peak_of(work: Any) -> int:
     """Return the most memory that arrays take at a time, bytes."""
     tracemalloc.start()
     try:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -59,7 +60,7 @@ def test_all_photographs_are_there() -> None:
 
 
 @pytest.fixture(scope='module')
-def panel(tmp_path_factory) -> Path:
+def panel(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return a file with what the command prints."""
     photographs = sorted(PANEL.glob('*.png'))
     done = ahf('identify', *photographs, '--family', 'aicon14', '--json', timeout=3600)
@@ -69,7 +70,7 @@ def panel(tmp_path_factory) -> Path:
     return results
 
 
-def test_recall_and_wrong_ids_on_the_panel(panel) -> None:
+def test_recall_and_wrong_ids_on_the_panel(panel: Path) -> None:
     truth = read_truth(PANEL / 'truth.csv')
     figures = total(evaluate(truth, read_results(panel)).values())
     assert figures.expected == 546
@@ -80,7 +81,9 @@ def test_recall_and_wrong_ids_on_the_panel(panel) -> None:
 
 
 @pytest.mark.parametrize('name', FORMATS)
-def test_exports_of_the_panel_hold_what_was_measured(panel, name, tmp_path) -> None:
+def test_exports_of_the_panel_hold_what_was_measured(
+    panel: Path, name: str, tmp_path: Path
+) -> None:
     """Control coordinates go along; they are in mm, and a format that has none takes none."""
     images = read_measured_images(panel)
     control = Control(read_points(PANEL / 'points.csv'), 'EPSG:25832', 0.01)
@@ -103,7 +106,7 @@ def test_targets_on_the_panel_are_counted_among_dots_without_code() -> None:
         assert abs(count - len(truth[name])) <= 2  # measured in all ten: 0 to 2
 
 
-def test_nothing_on_the_panel_is_made_up(panel) -> None:
+def test_nothing_on_the_panel_is_made_up(panel: Path) -> None:
     """The truth leaves out targets that the frame cuts; two were decoded there, both right."""
     truth = read_truth(PANEL / 'truth.csv')
     for name, targets in read_results(panel).items():
@@ -123,14 +126,14 @@ def test_nothing_on_the_panel_is_made_up(panel) -> None:
     ],
 )
 def test_words_of_other_sectors_or_radii_contest_those_that_are_read(
-    family, photographs, most
+    family: str, photographs: Any, most: int
 ) -> None:
     detect = create_detector('ring', family=family)
     some = sorted(PANEL.glob('*.png'))[photographs]
     assert sum(len(detect(read_image(path))) for path in some) <= most
 
 
-def test_each_photograph_has_a_line_with_its_size_and_time(panel) -> None:
+def test_each_photograph_has_a_line_with_its_size_and_time(panel: Path) -> None:
     records = [json.loads(line) for line in panel.read_text().splitlines()]
     assert [Path(record['image']) for record in records] == sorted(PANEL.glob('*.png'))
     assert {(record['width'], record['height']) for record in records} == {(2000, 1333)}
@@ -138,7 +141,7 @@ def test_each_photograph_has_a_line_with_its_size_and_time(panel) -> None:
 
 
 @pytest.mark.parametrize(('detector', 'measured'), [('ring', 53), ('traditional', 61)])
-def test_a_wall_with_dark_targets(detector, measured) -> None:
+def test_a_wall_with_dark_targets(detector: str, measured: int) -> None:
     targets = create_detector(detector, family='aicon14', polarity='dark')(read_image(WALL))
     (truth,) = read_truth(WALL_TRUTH).values()
     figures = score(truth, targets)

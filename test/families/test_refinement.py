@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import cv2
 import numpy as np
@@ -38,7 +39,7 @@ def distances(targets: list[Target], scene: SceneSettings) -> np.ndarray:
 
 
 @pytest.mark.parametrize('polarity', ['dark', 'bright'])
-def test_places_become_those_of_the_image(polarity) -> None:
+def test_places_become_those_of_the_image(polarity: str) -> None:
     scene = replace(SCENE, polarity=polarity)
     targets = found(scene)
     refined = refine_centres(rendered(scene).image, targets, [CODE])
@@ -50,7 +51,7 @@ def test_places_become_those_of_the_image(polarity) -> None:
 
 
 @pytest.mark.parametrize('polarity', ['dark', 'bright'])
-def test_small_dots_are_not_taken_for_their_own_inside(polarity) -> None:
+def test_small_dots_are_not_taken_for_their_own_inside(polarity: str) -> None:
     scene = replace(SCENE, targets=24, polarity=polarity, dot_radius=7.0, light='normal')
     shown = rendered(scene)
     refined = refine_centres(shown.image, shown.targets, [CODE])
@@ -113,12 +114,12 @@ def test_nothing_is_refined_to_nothing() -> None:
 
 @pytest.mark.lasting
 @pytest.mark.parametrize('name', ['ring', 'traditional'])
-def test_a_filter_leaves_no_trace_in_the_places(name) -> None:
+def test_a_filter_leaves_no_trace_in_the_places(name: str) -> None:
     """The detector is blind to the image as received; AHF refines there all the same."""
     image = rendered(SCENE).image
 
     class Filtered(type(create_detector(name, family='metashape12'))):
-        def __call__(self, shown):
+        def __call__(self, shown: Any) -> list[Target]:
             return [] if shown is image else super().__call__(shown)
 
     settings = AdaptiveSettings(threads=1, genetic=GeneticSettings(max_evaluations=6))

@@ -6,7 +6,9 @@ import gc
 import runpy
 import time
 import weakref
-from typing import NoReturn
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any, NoReturn
 
 import cv2
 import numpy as np
@@ -71,7 +73,7 @@ def made(name: str) -> Detector:
     ],
 )
 def test_every_detector_is_called_as_registered_and_refuses_what_is_no_image(
-    name, image, message
+    name: str, image: np.ndarray, message: str
 ) -> None:
     with pytest.raises(ValueError, match=message):
         made(name)(image)
@@ -94,7 +96,9 @@ def test_every_family_chooses_a_detector() -> None:
         ('aruco', 'metashape12,aicon12', ['auto, ring, command', 'aruco_4x4_50, ']),
     ],
 )
-def test_a_detector_that_does_not_identify_the_family_is_refused(name, family, accepted) -> None:
+def test_a_detector_that_does_not_identify_the_family_is_refused(
+    name: str, family: str, accepted: list[str]
+) -> None:
     with pytest.raises(ValueError) as caught:
         create_detector(name, family=family)
     message = str(caught.value)
@@ -126,7 +130,7 @@ def test_only_families_that_can_be_counted_are_estimated() -> None:
 
 
 @pytest.mark.parametrize('name', ALL)
-def test_refinement_drafts_and_patience_are_part_of_the_contract(name) -> None:
+def test_refinement_drafts_and_patience_are_part_of_the_contract(name: str) -> None:
     detector = made(name)
     assert isinstance(detector, Refiner) == (not name.endswith('_published') and name != 'command')
     assert isinstance(detector, Drafter) == (name in SQUARES)
@@ -157,19 +161,21 @@ def test_settings_reach_the_detector() -> None:
         ({'report_undecoded': 1}, r'report_undecoded is 1, accepted is true or false'),
     ],
 )
-def test_settings_that_make_no_sense_are_refused(change, message) -> None:
+def test_settings_that_make_no_sense_are_refused(change: Any, message: str) -> None:
     with pytest.raises(ValueError, match=message):
         DetectorSettings(**change)
 
 
-def added(tmp_path, monkeypatch, module: str, body: str):
+def added(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, module: str, body: str
+) -> dict[str, Any]:
     """Return the registry of a process in which another package has added a detector."""
     write_package(tmp_path, module, body)
     monkeypatch.syspath_prepend(str(tmp_path))
     return runpy.run_path(detectors.__file__)
 
 
-def test_a_detector_of_another_package(tmp_path, monkeypatch) -> None:
+def test_a_detector_of_another_package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     registry = added(tmp_path, monkeypatch, 'package_with_detector', EXAMPLE.read_text())
     assert registry['DETECTOR_NAMES'] == (*DETECTOR_NAMES, 'mine')
     detector = registry['create_detector']('mine', min_radius=5.0, detector_timeout=600.0)
@@ -181,7 +187,9 @@ def test_a_detector_of_another_package(tmp_path, monkeypatch) -> None:
     assert identify(image, detector=detector, expected_targets=1).count == 1
 
 
-def test_a_detector_of_another_package_that_cannot_be_imported(tmp_path, monkeypatch) -> None:
+def test_a_detector_of_another_package_that_cannot_be_imported(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     registry = added(tmp_path, monkeypatch, 'package_that_is_broken', 'import nothing_like_this')
     assert registry['create_detector']('ring').name == 'ring'
     with pytest.raises(ValueError, match="detector is 'mine', but package_that_is_broken:MyDet"):
@@ -209,7 +217,12 @@ class MyDetector:
     ],
 )
 def test_a_detector_of_another_package_that_cannot_be_made(
-    tmp_path, monkeypatch, number, family, made, reason
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    number: int,
+    family: str,
+    made: str,
+    reason: str,
 ) -> None:
     module = f'package_not_made_{number}'
     registry = added(tmp_path, monkeypatch, module, HOSTILE.format(family=family, made=made))
@@ -224,32 +237,32 @@ class Plugin:
 
     name = family = 'mine'
 
-    def __init__(self, call) -> None:
+    def __init__(self, call: Any) -> None:
         self._call = call
 
-    def __call__(self, image):
+    def __call__(self, image: np.ndarray) -> Any:
         try:
             return self._call(image)
         finally:
             image[:] = 0
 
-    def refine(self, image, targets) -> NoReturn:
+    def refine(self, image: np.ndarray, targets: Any) -> NoReturn:
         raise RuntimeError('no GPU')
 
 
 class Endless(list):
-    def __iter__(self):
+    def __iter__(self) -> Iterator[Target]:
         while True:
             yield Target(7, 19, 1.0, 2.0, 4.0, 3.0)
 
 
 class Raising(Target):
-    def __getattribute__(self, name):
+    def __getattribute__(self, name: str) -> NoReturn:
         raise RuntimeError('no fields')
 
 
-def failing(error):
-    def fail(image) -> NoReturn:
+def failing(error: BaseException) -> Callable[[np.ndarray], NoReturn]:
+    def fail(image: np.ndarray) -> NoReturn:
         raise error
 
     return fail
@@ -266,7 +279,9 @@ def failing(error):
         (lambda _: [Raising(7, 19, 1.0, 2.0, 4.0, 3.0)], 'failed: RuntimeError: no fields'),
     ],
 )
-def test_no_failure_and_no_result_of_another_package_gets_past_its_guard(call, message) -> None:
+def test_no_failure_and_no_result_of_another_package_gets_past_its_guard(
+    call: Any, message: str
+) -> None:
     detector = guarded(Plugin(call), 0.2 if 'longer' in message else 600.0)
     image = RAMP.copy()
     with pytest.raises(ValueError) as raised:
@@ -283,7 +298,7 @@ def test_a_refinement_that_fails() -> None:
 def test_no_image_that_a_detector_failed_on_stays_in_memory() -> None:
     images = []
 
-    def fail(image) -> NoReturn:
+    def fail(image: np.ndarray) -> NoReturn:
         images.append(weakref.ref(image))
         raise RuntimeError('no')
 

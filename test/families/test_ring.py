@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache, partial
+from typing import Any
 
 import cv2
 import numpy as np
@@ -29,7 +30,7 @@ LIGHTS = [('dark', 'stripe'), ('bright', 'lattice')]
 
 @pytest.mark.parametrize(('polarity', 'light'), LIGHTS)
 @pytest.mark.parametrize('name', FAMILY_NAMES)
-def test_all_targets_under_stripes_and_lattices(name, polarity, light) -> None:
+def test_all_targets_under_stripes_and_lattices(name: str, polarity: str, light: str) -> None:
     figures = scored(rendered(replace(SMALL, family=name, polarity=polarity, light=light)))
     assert counts(figures) == (6, 0, 0)
     *others, worst = errors_of(figures)
@@ -40,7 +41,9 @@ def test_all_targets_under_stripes_and_lattices(name, polarity, light) -> None:
 @pytest.mark.lasting
 @pytest.mark.parametrize(('polarity', 'light'), LIGHTS)
 @pytest.mark.parametrize('name', FAMILY_NAMES)
-def test_deep_shadow_costs_a_target_at_most_and_no_wrong_id(name, polarity, light) -> None:
+def test_deep_shadow_costs_a_target_at_most_and_no_wrong_id(
+    name: str, polarity: str, light: str
+) -> None:
     scene = replace(SMALL, family=name, polarity=polarity, light=light, ambient=0.12)
     figures = scored(rendered(scene))
     assert (figures.wrong, figures.false_positives) == (0, 0)
@@ -64,7 +67,7 @@ SOFT = replace(SMALL, width=900, height=640, targets=5, blur=3.0)
     ],
     ids=['smallest', 'small', 'large', 'oblique', 'soft and small', 'soft', 'soft and large'],
 )
-def test_sizes_and_views(scene, limit) -> None:
+def test_sizes_and_views(scene: Any, limit: float) -> None:
     figures = scored(rendered(scene))
     assert counts(figures) == (scene.targets, 0, 0)
     assert errors_of(figures)[-1] < limit
@@ -72,7 +75,7 @@ def test_sizes_and_views(scene, limit) -> None:
 
 @pytest.mark.lasting
 @pytest.mark.parametrize('light', ['stripe', 'fine_stripe', 'lattice'])
-def test_oblique_views_under_stripes_and_lattices(light) -> None:
+def test_oblique_views_under_stripes_and_lattices(light: str) -> None:
     view = SceneSettings(width=1000, height=600, targets=12, tilt=64.0, focal_length=3.0, seed=1)
     figures = scored(rendered(replace(view, light=light, ambient=0.12)))
     assert (figures.wrong, figures.false_positives) == (0, 0)
@@ -81,7 +84,7 @@ def test_oblique_views_under_stripes_and_lattices(light) -> None:
 
 @pytest.mark.lasting
 @pytest.mark.parametrize(('light', 'enough'), [('normal', 20), ('stripe', 16)])
-def test_small_oblique_targets(light, enough) -> None:
+def test_small_oblique_targets(light: str, enough: int) -> None:
     view = SceneSettings(width=1100, height=800, targets=20, dot_radius=7.0, tilt=60.0, seed=11)
     figures = scored(rendered(replace(view, focal_length=3.0, light=light, ambient=0.3)))
     assert (figures.wrong, figures.false_positives) == (0, 0)
@@ -98,7 +101,7 @@ def test_ellipse_and_code_are_those_of_the_target() -> None:
 
 
 @pytest.mark.parametrize('light', ['normal', 'stripe', 'lattice'])
-def test_an_image_without_targets_shows_none(light) -> None:
+def test_an_image_without_targets_shows_none(light: str) -> None:
     scene = replace(SMALL, width=1000, height=800, targets=0, distractors=20, light=light)
     assert identified(rendered(scene).image) == []
 
@@ -109,7 +112,7 @@ def test_distractors_leave_targets_alone() -> None:
 
 
 @pytest.mark.parametrize('polarity', ['dark', 'bright'])
-def test_polarity_is_found_or_obeyed(polarity) -> None:
+def test_polarity_is_found_or_obeyed(polarity: str) -> None:
     scene = rendered(replace(SMALL, polarity=polarity))
     other = 'bright' if polarity == 'dark' else 'dark'
     found = identified(scene.image, polarity=polarity)
@@ -171,7 +174,7 @@ def test_an_id_is_reported_once_or_not_at_all() -> None:
 @pytest.mark.lasting
 @pytest.mark.parametrize('kept', [0.5, 1.5, 2.5, 3.2])
 @pytest.mark.parametrize('name', FAMILY_NAMES)
-def test_a_target_that_the_frame_cuts_is_not_guessed(name, kept) -> None:
+def test_a_target_that_the_frame_cuts_is_not_guessed(name: str, kept: float) -> None:
     rendering = rendered(replace(SMALL, family=name))
     cut = min(rendering.targets, key=lambda target: target.x)
     left = round(cut.x - kept * cut.semi_major)
@@ -217,13 +220,13 @@ def test_a_covered_sector_is_not_guessed() -> None:
         partial(refine_centres, targets=[], families=[CODE]),
     ],
 )
-def test_what_is_no_image_is_refused(take, image) -> None:
+def test_what_is_no_image_is_refused(take: Any, image: np.ndarray) -> None:
     with pytest.raises(ValueError, match=r'image .*accepted'):
         take(image)
 
 
 @pytest.mark.parametrize('shape', [(16, 16), (16, 3000), (17, 333)])
-def test_the_smallest_images(shape) -> None:
+def test_the_smallest_images(shape: tuple[int, int]) -> None:
     image = np.random.default_rng(0).integers(0, 256, shape).astype(np.uint8)
     assert identified(image) == []
 
@@ -251,7 +254,7 @@ def sheet(name: str = 'metashape12', bright: bool = False) -> Sheet:
         *((name, False, (160, 140, 1.0), 0.1) for name in FAMILY_NAMES),
     ],
 )
-def test_faint_targets_are_identified(name, bright, levels, precision) -> None:
+def test_faint_targets_are_identified(name: str, bright: Any, levels: Any, precision: Any) -> None:
     of = sheet(name, bright)
     image = of.photograph(Exposure(levels=levels))
     figures = score(of.truth, identified(image, family=name))
@@ -260,14 +263,16 @@ def test_faint_targets_are_identified(name, bright, levels, precision) -> None:
 
 
 @pytest.mark.parametrize('light', [3.0, 4.0])
-def test_over_exposed_targets_are_identified(light) -> None:
+def test_over_exposed_targets_are_identified(light: float) -> None:
     figures = score(sheet().truth, identified(sheet().photograph(Exposure(light=light))))
     assert counts(figures) == (4, 0, 0)
     assert np.abs(figures.errors).max() < 0.05
 
 
 @pytest.mark.parametrize(('levels', 'sharpened'), [((300, 45, 1.5), 0.0), ((230, 45, 1.0), 2.0)])
-def test_bright_marks_that_a_camera_clips_or_sharpens_are_read(levels, sharpened) -> None:
+def test_bright_marks_that_a_camera_clips_or_sharpens_are_read(
+    levels: tuple[int, int, float], sharpened: float
+) -> None:
     of = sheet(bright=True)
     image = of.photograph(Exposure(levels=levels))
     blurred = cv2.GaussianBlur(image, (0, 0), 1.5)
@@ -276,7 +281,7 @@ def test_bright_marks_that_a_camera_clips_or_sharpens_are_read(levels, sharpened
 
 
 @pytest.mark.parametrize('light', ['normal', 'stripe', 'lattice'])
-def test_an_image_of_clear_targets_is_read_once(light) -> None:
+def test_an_image_of_clear_targets_is_read_once(light: str) -> None:
     image, settings = (
         rendered(replace(SMALL, light=light)).image,
         DetectorSettings(family='metashape12'),
@@ -329,7 +334,7 @@ def whole_sheet() -> Sheet:
 
 @pytest.mark.lasting
 @pytest.mark.parametrize('sight', COVERED)
-def test_what_is_covered_costs_targets_and_gives_no_wrong_one(sight) -> None:
+def test_what_is_covered_costs_targets_and_gives_no_wrong_one(sight: str) -> None:
     exposure, minimum = COVERED[sight]
     targets = identified(whole_sheet().photograph(exposure))
     figures = score(whole_sheet().truth, targets)
@@ -338,7 +343,7 @@ def test_what_is_covered_costs_targets_and_gives_no_wrong_one(sight) -> None:
 
 @pytest.mark.lasting
 @pytest.mark.parametrize('read_as', [name for name in FAMILY_NAMES if name != 'metashape12'])
-def test_targets_of_another_family_are_not_reported(read_as) -> None:
+def test_targets_of_another_family_are_not_reported(read_as: str) -> None:
     assert not identified(whole_sheet().photograph(Exposure()), family=read_as)
 
 
@@ -346,7 +351,7 @@ ROW = SceneSettings(width=900, height=640, targets=20, dot_radius=10.0, radius_s
 
 
 @cache
-def seen(**changes):
+def seen(**changes: Any) -> Any:
     """Return the figures and the shifts of the edges of a scene with dots of 10 px, by ID."""
     scene = rendered(replace(ROW, **changes))
     targets = identified(scene.image)
@@ -356,7 +361,7 @@ def seen(**changes):
 @pytest.mark.lasting
 @pytest.mark.parametrize('polarity', ['dark', 'bright'])
 @pytest.mark.parametrize('edge_shift', [-1.0, -0.6, 0.6, 1.0])
-def test_shifted_edges_cost_no_target_and_are_reported(edge_shift, polarity) -> None:
+def test_shifted_edges_cost_no_target_and_are_reported(edge_shift: float, polarity: str) -> None:
     figures, shifts = seen(polarity=polarity, edge_shift=edge_shift)
     plain, _ = seen(polarity=polarity)
     assert counts(figures) == (20, 0, 0)
@@ -365,7 +370,7 @@ def test_shifted_edges_cost_no_target_and_are_reported(edge_shift, polarity) -> 
 
 
 @pytest.mark.parametrize('overexposure', [2.0, 4.0])
-def test_edges_of_over_exposed_targets_are_shifted(overexposure) -> None:
+def test_edges_of_over_exposed_targets_are_shifted(overexposure: float) -> None:
     (figures, shifts), (_, as_printed) = seen(overexposure=overexposure), seen(polarity='dark')
     assert counts(figures) == (20, 0, 0)
     assert np.median([*shifts.values()]) < np.median([*as_printed.values()]) - 0.1

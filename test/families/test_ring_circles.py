@@ -13,7 +13,7 @@ CODE = family('metashape12')
 
 @pytest.mark.parametrize('start', [0.0, 0.7, 2 * np.pi - 0.01])
 @pytest.mark.parametrize('polarity', [1, -1])
-def test_a_marked_sector_has_an_inner_and_an_outer_edge(start, polarity) -> None:
+def test_a_marked_sector_has_an_inner_and_an_outer_edge(start: float, polarity: int) -> None:
     """Sectors are counted counter-clockwise as seen, which is towards -y."""
     circles = target_circles(
         np.array([0b000000000100]), np.array([start]), np.array([polarity]), 10, CODE

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from typing import Any
 
 import cv2
 import numpy as np
@@ -17,14 +18,16 @@ SCENES = [('ring', 'normal'), ('ring', 'stripe'), ('traditional', 'normal')]
 
 
 @pytest.fixture(params=['ring', 'traditional'])
-def detector(request):
+def detector(request: pytest.FixtureRequest) -> Any:
     return create_detector(request.param, family='metashape12')
 
 
 @pytest.mark.parametrize('polarity', ['dark', 'bright'])
 @pytest.mark.parametrize('family', FAMILY_NAMES)
 @pytest.mark.parametrize(('name', 'maximum_error'), [('ring', 0.03), ('traditional', 0.05)])
-def test_all_targets_of_every_family(name, maximum_error, family, polarity) -> None:
+def test_all_targets_of_every_family(
+    name: str, maximum_error: float, family: Any, polarity: str
+) -> None:
     figures = scored(rendered(replace(SMALL, family=family, polarity=polarity)), name)
     assert counts(figures) == (6, 0, 0)
     assert errors_of(figures)[-1] < maximum_error
@@ -40,7 +43,7 @@ def test_all_targets_of_every_family(name, maximum_error, family, polarity) -> N
     ids=['12 bit', 'float32', 'float64'],
 )
 @pytest.mark.parametrize(('name', 'light'), SCENES)
-def test_other_types_of_pixels_show_the_same(converted, name, light) -> None:
+def test_other_types_of_pixels_show_the_same(converted: Any, name: str, light: str) -> None:
     image = rendered(replace(SMALL, light=light)).image
     detector = create_detector(name, family='metashape12')
     expected, found = detector(image), detector(converted(image))
@@ -49,20 +52,20 @@ def test_other_types_of_pixels_show_the_same(converted, name, light) -> None:
         assert (target.x, target.y) == pytest.approx((other.x, other.y), abs=0.05)
 
 
-def test_a_mirrored_image_shows_other_codes(detector) -> None:
+def test_a_mirrored_image_shows_other_codes(detector: Any) -> None:
     rendering = rendered(SMALL)
     mirrored = detector(np.ascontiguousarray(rendering.image[:, ::-1]))
     assert {target.id for target in mirrored} != {target.id for target in rendering.targets}
 
 
-def test_noise_shows_no_targets(detector) -> None:
+def test_noise_shows_no_targets(detector: Any) -> None:
     noise = np.random.default_rng(0).integers(0, 256, (600, 800)).astype(np.uint8)
     assert detector(noise) == []
     assert detector(cv2.GaussianBlur(noise, (0, 0), 5) * 4) == []
 
 
 @pytest.mark.parametrize(('name', 'light'), SCENES)
-def test_the_result_does_not_depend_on_threads(name, light) -> None:
+def test_the_result_does_not_depend_on_threads(name: str, light: str) -> None:
     image = rendered(replace(SMALL, light=light)).image
     detector = create_detector(name, family='metashape12')
     expected = detector(image)
@@ -77,7 +80,7 @@ def test_the_result_does_not_depend_on_threads(name, light) -> None:
         assert list(executor.map(detector, [image] * 4)) == [expected] * 4
 
 
-def test_the_image_is_not_changed(detector) -> None:
+def test_the_image_is_not_changed(detector: Any) -> None:
     image = rendered(SMALL).image.astype(np.float32)
     before = image.copy()
     detector(image)

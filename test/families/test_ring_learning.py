@@ -147,7 +147,9 @@ def test_the_family_of_photographs() -> None:
     assert np.mean(code.ids(found.words) > 0) > 0.99
 
 
-def test_the_command_writes_a_family_that_the_detector_reads(tmp_path: Path, capsys) -> None:
+def test_the_command_writes_a_family_that_the_detector_reads(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     scene = shown('metashape12')
     write_image(tmp_path / 'a.png', scene.image)
     output = tmp_path / 'mine.yaml'
@@ -166,7 +168,9 @@ def test_the_command_writes_a_family_that_the_detector_reads(tmp_path: Path, cap
     assert sorted(it.id for it in targets) == sorted(it.code for it in scene.targets)
 
 
-def test_the_command_writes_two_families_and_says_what_is_wrong(tmp_path: Path, capsys) -> None:
+def test_the_command_writes_two_families_and_says_what_is_wrong(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     write_image(tmp_path / 'a.png', shown('cct12').image)
     write_image(tmp_path / 'b.png', shown('cct10').image)
     (tmp_path / 'c.png').write_bytes(b'nothing')
@@ -189,7 +193,7 @@ def test_the_command_writes_two_families_and_says_what_is_wrong(tmp_path: Path, 
     ],
 )
 def test_the_command_says_that_there_is_no_family(
-    tmp_path: Path, capsys, name: str, message: str
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], name: str, message: str
 ) -> None:
     write_image(tmp_path / 'a.png', shown(name, targets=2).image)
     assert status('learn-family', tmp_path / 'a.png', '-o', tmp_path / 'mine.yaml') == 1
@@ -197,7 +201,9 @@ def test_the_command_says_that_there_is_no_family(
     assert not (tmp_path / 'mine.yaml').exists()
 
 
-def test_one_target_and_no_photographs_are_no_family(tmp_path: Path, capsys) -> None:
+def test_one_target_and_no_photographs_are_no_family(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     output = tmp_path / 'mine.yaml'
     write_image(tmp_path / 'a.png', shown('cct10', targets=1).image)
     assert status('learn-family', tmp_path / 'a.png', '-o', output) == 1
@@ -208,7 +214,9 @@ def test_one_target_and_no_photographs_are_no_family(tmp_path: Path, capsys) -> 
     assert not output.exists()
 
 
-def test_photographs_and_point_lists_are_not_learnt_together(tmp_path: Path, capsys) -> None:
+def test_photographs_and_point_lists_are_not_learnt_together(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     assert status('learn-family', 'a.png', 'b.csv', '-o', tmp_path / 'mine.yaml') != 0
     assert "sources are 2 with 'b.csv', accepted are photographs, or" in capsys.readouterr().err
 
@@ -222,7 +230,7 @@ def test_photographs_and_point_lists_are_not_learnt_together(tmp_path: Path, cap
     ],
 )
 def test_rings_of_another_family_are_named(
-    tmp_path: Path, capsys, name: str, message: str
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], name: str, message: str
 ) -> None:
     file = tmp_path / 'mine.yaml'
     file.write_text('family: mine\nbits: 9\nband: [1.6, 2.4]\nwords: all\n')

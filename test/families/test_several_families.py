@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -63,13 +65,13 @@ def matches(targets: list[Target], truth: list[tuple[str, int, float, float]]) -
         *((THREE, 'normal', families) for families in (','.join(THREE), 'auto')),
     ],
 )
-def test_every_target_says_its_family(shown, light, families) -> None:
+def test_every_target_says_its_family(shown: Any, light: str, families: Any) -> None:
     image, truth = side_by_side(*(scene(name, light) for name in shown))
     assert matches(identified(image, family=families), truth)
 
 
 @pytest.mark.parametrize('name', RING_NAMES)
-def test_all_families_together_read_what_the_one_that_is_there_reads(name) -> None:
+def test_all_families_together_read_what_the_one_that_is_there_reads(name: str) -> None:
     image = rendered(
         replace(SMALL, width=800, height=600, targets=8, family=name, light='stripe')
     ).image
@@ -115,7 +117,7 @@ def test_an_id_of_two_families_is_two_targets() -> None:
 
 @pytest.mark.parametrize('name', SHARED)
 @pytest.mark.parametrize('families', ['auto', ''])
-def test_a_print_of_three_families_is_of_the_family_beside_it(name, families) -> None:
+def test_a_print_of_three_families_is_of_the_family_beside_it(name: str, families: str) -> None:
     """The print is the same in each image; what is beside it is not."""
     others = [(name, int(family(name).words[index])) for index in (20, 40)]
     image = sheet(('metashape12', SHARED['metashape12']), *others)
@@ -125,7 +127,7 @@ def test_a_print_of_three_families_is_of_the_family_beside_it(name, families) ->
 
 
 @pytest.mark.parametrize('name', SHARED)
-def test_a_print_of_three_families_alone_is_of_the_one_that_is_named(name) -> None:
+def test_a_print_of_three_families_alone_is_of_the_one_that_is_named(name: str) -> None:
     image = sheet(('metashape12', SHARED['metashape12']))
     assert [(it.family, it.code) for it in identified(image, family=name)] == [
         (name, SHARED[name])
@@ -133,7 +135,7 @@ def test_a_print_of_three_families_alone_is_of_the_one_that_is_named(name) -> No
 
 
 @pytest.mark.parametrize('families', ['auto', 'metashape16,metashape12'])
-def test_a_print_of_three_families_alone_is_of_none(families) -> None:
+def test_a_print_of_three_families_alone_is_of_none(families: str) -> None:
     image = sheet(('metashape12', SHARED['metashape12']))
     assert identified(image, family=families) == []
     dots = identified(image, family=families, report_undecoded=True)
@@ -166,7 +168,7 @@ def test_both_prints_are_found_among_the_many_dots_of_a_lattice() -> None:
 
 @pytest.mark.parametrize('families', ['cct10', 'cct12'])
 @pytest.mark.parametrize('light', ['normal', 'stripe'])
-def test_rings_of_all_words_have_the_numbers_of_their_programs(families, light) -> None:
+def test_rings_of_all_words_have_the_numbers_of_their_programs(families: str, light: str) -> None:
     shown = scene(families, light)
     truth = [(it.family, it.id, it.x, it.y) for it in shown.targets]
     assert matches(identified(shown.image, family=families), truth)
@@ -182,7 +184,7 @@ def test_targets_of_a_small_family_are_not_those_of_a_larger_one_with_the_same_p
 
 @pytest.mark.parametrize(('rule', 'free'), [('aicon12', 'cct12'), ('aicon14', 'cct14')])
 def test_three_words_that_obey_a_rule_are_of_its_family_unless_another_one_breaks_it(
-    rule, free
+    rule: str, free: str
 ) -> None:
     obeying = [int(word) for word in family(rule).words[[20, 50, 80]]]
     breaking = [int(word) for word in family(free).words if word not in family(rule).words][40:42]
@@ -194,7 +196,9 @@ def test_three_words_that_obey_a_rule_are_of_its_family_unless_another_one_break
 
 
 @pytest.mark.parametrize(('name', 'radius', 'seed'), [('cct11', 7, 18), ('cct16', 16, 11)])
-def test_no_word_stands_that_a_family_found_later_explains_better(name, radius, seed) -> None:
+def test_no_word_stands_that_a_family_found_later_explains_better(
+    name: str, radius: int, seed: int
+) -> None:
     """In the one, cct13 has words of the clearest bands, and in the other cct8."""
     wide = {'width': 1000 + 40 * radius, 'height': 700 + 30 * radius, 'targets': 12}
     light = {'light': 'stripe', 'ambient': 0.3} if name == 'cct11' else {}
@@ -203,7 +207,7 @@ def test_no_word_stands_that_a_family_found_later_explains_better(name, radius, 
     assert matches(identified(shown.image, family=','.join(RING_NAMES)), truth)
 
 
-def test_rings_of_a_data_file_are_rendered_and_identified(tmp_path) -> None:
+def test_rings_of_a_data_file_are_rendered_and_identified(tmp_path: Path) -> None:
     file = tmp_path / 'mine.yaml'
     file.write_text('family: mine\nbits: 10\nband: [1.42, 1.87]\nwords: {changes: 6}\n')
     shown = rendered(

@@ -23,7 +23,9 @@ def trapezoid(side: float, upper: float) -> np.ndarray:
         (600.0, 0.7, -0.5, 0.0),  # so near that its sides may converge
     ],
 )
-def test_small_squares_have_parallel_sides(side, upper, lowest, highest) -> None:
+def test_small_squares_have_parallel_sides(
+    side: float, upper: float, lowest: float, highest: float
+) -> None:
     (odds,) = parallel_odds(square_frames(trapezoid(side, upper)[None]), 1000)
     assert lowest <= odds <= highest
 

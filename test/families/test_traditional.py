@@ -31,7 +31,7 @@ def identified(image: np.ndarray, **settings: object) -> list[Target]:
 
 
 @pytest.mark.parametrize('polarity', ['dark', 'bright'])
-def test_refinement_starts_from_what_a_filter_shows(polarity) -> None:
+def test_refinement_starts_from_what_a_filter_shows(polarity: str) -> None:
     shown = scene(polarity=polarity, light='stripe', ambient=1.0)
     detector = create_detector('traditional')
     filtered = HomomorphicFilter(shown.image).filtered(1.2, 0.25)
@@ -50,7 +50,7 @@ def test_refinement_starts_from_what_a_filter_shows(polarity) -> None:
     ],
     ids=['small', 'large', 'oblique'],
 )
-def test_sizes_and_views(changes) -> None:
+def test_sizes_and_views(changes: dict[str, float]) -> None:
     shown = scene(**changes)
     found = identified(shown.image)
     assert counted(shown, found) == (changes['targets'], 0, 0)
@@ -73,7 +73,7 @@ def test_stripes_defeat_it_and_the_filter_restores_it() -> None:
 
 
 @pytest.mark.parametrize('light', ['stripe', 'lattice'])
-def test_small_targets_in_deep_shadow_are_read_through_a_filter(light) -> None:
+def test_small_targets_in_deep_shadow_are_read_through_a_filter(light: str) -> None:
     shown = rendering(
         width=1600, height=1066, targets=24, dot_radius=10, light=light, ambient=0.12
     )
@@ -98,7 +98,9 @@ def test_targets_are_of_one_colour_that_of_most() -> None:
     'settings',
     [{'polarity': 'bright'}, {'min_radius': 12.0}, {'max_radius': 8.0}, {'family': 'metashape14'}],
 )
-def test_what_is_not_asked_for_is_not_reported(settings) -> None:
+def test_what_is_not_asked_for_is_not_reported(
+    settings: dict[str, float] | dict[str, str],
+) -> None:
     assert identified(scene().image, **settings) == []
 
 

@@ -30,7 +30,7 @@ def test_an_image_without_edges_has_no_candidates() -> None:
 
 @pytest.mark.parametrize('radius', [5.0, 9.0, 18.0, 40.0])
 @pytest.mark.parametrize('polarity', [1, -1])
-def test_votes_find_dots_of_all_sizes_under_stripes(radius, polarity) -> None:
+def test_votes_find_dots_of_all_sizes_under_stripes(radius: float, polarity: int) -> None:
     colours = (220, 40) if polarity == 1 else (40, 220)
     gray = in_stripes(drawn([(150.0, 120.0, radius)], *colours), round(2.2 * radius), 0.4)
     points, polarities = voted(gray, (polarity,))
@@ -40,20 +40,22 @@ def test_votes_find_dots_of_all_sizes_under_stripes(radius, polarity) -> None:
 
 @pytest.mark.parametrize('radius', [4.6, 5.6, 6.6])
 @pytest.mark.parametrize('shift', [0.0, 2.3, 4.6, 6.9])
-def test_small_dots_are_placed_between_pixels_under_fine_stripes(radius, shift) -> None:
+def test_small_dots_are_placed_between_pixels_under_fine_stripes(
+    radius: float, shift: float
+) -> None:
     points, _ = voted(in_stripes(drawn([(150.3 + shift, 120.4, radius)]), 19, 0.4))
     assert np.linalg.norm(points - (150.3 + shift, 120.4), axis=1).min() < 0.25 * radius
 
 
 @pytest.mark.parametrize('angle', [0.0, 0.4, 1.1, 2.0])
 @pytest.mark.parametrize('aspect', [0.65, 0.5, 0.42])
-def test_votes_find_the_middles_of_oblique_dots_under_stripes(angle, aspect) -> None:
+def test_votes_find_the_middles_of_oblique_dots_under_stripes(angle: float, aspect: float) -> None:
     points, _ = voted(in_stripes(drawn([(150, 120, 20, 20 * aspect, angle)]), 50, 0.4))
     assert np.linalg.norm(points - (150, 120), axis=1).min() < 0.25 * 20 * aspect**0.5
 
 
 @pytest.mark.parametrize('polarity', [1, -1])
-def test_only_the_polarity_that_is_asked_for_votes(polarity) -> None:
+def test_only_the_polarity_that_is_asked_for_votes(polarity: int) -> None:
     points, _ = voted(drawn([(150.0, 120.0, 12.0)]), (polarity,))
     near = np.linalg.norm(points - (150, 120), axis=1) < 3
     assert near.any() == (polarity == 1)
@@ -64,7 +66,7 @@ def test_stripes_alone_get_no_votes() -> None:
     assert len(points) == 0
 
 
-def test_many_bright_spots_do_not_crowd_out_dark_dots(monkeypatch) -> None:
+def test_many_bright_spots_do_not_crowd_out_dark_dots(monkeypatch: pytest.MonkeyPatch) -> None:
     gray = drawn([(x, y, 8.0) for x in range(20, 200, 30) for y in range(20, 230, 30)], 30, 220)
     gray[:, 200:] = in_stripes(drawn([(230.0, 60.0, 8.0), (280.0, 150.0, 8.0)]), 18, 0.4)[:, 200:]
     edges = image_pyramid(gray, 60.0).edges
@@ -87,7 +89,7 @@ def votes_about(x: float, y: float, plane: int, count: int) -> np.ndarray:
 
 @pytest.mark.parametrize('plane', [0, 1])
 @pytest.mark.parametrize('x', [20.0, 20.3, 20.5, 20.8])
-def test_a_peak_lies_between_cells(plane, x) -> None:
+def test_a_peak_lies_between_cells(plane: int, x: float) -> None:
     peaks = find_peaks([votes_about(x, 15.4, plane, 400)], SHAPE, 100, 2)
     assert peaks.plane.tolist() == [plane]
     assert (peaks.x[0], peaks.y[0]) == pytest.approx((x, 15.4), abs=0.15)

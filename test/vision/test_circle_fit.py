@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import pytest
@@ -53,7 +54,7 @@ DISC = drawn(dot_frame(*PLACE))
 
 
 @pytest.mark.parametrize('place', [(50.0, 50.0), (50.37, 49.81), (49.5, 50.5)])
-def test_the_centre_and_the_radius_of_a_disc(place) -> None:
+def test_the_centre_and_the_radius_of_a_disc(place: tuple[float, float]) -> None:
     fit = fitted(drawn(dot_frame(*place)), dot_frame(51.0, 49.5, 12.7))
     assert centre(fit) == pytest.approx(place, abs=0.005)
     assert frame.ellipse_axes(fit.frames)[0] == pytest.approx([12.0], abs=0.03)
@@ -100,12 +101,12 @@ def test_circles_of_several_groups_give_the_image_of_the_centre() -> None:
     ],
     ids=['even', 'slope', 'edge'],
 )
-def test_light_hardly_moves_the_centre(light, error) -> None:
+def test_light_hardly_moves_the_centre(light: str, error: float) -> None:
     assert centre(fitted(DISC * light, START)) == pytest.approx(PLACE, abs=error)
 
 
 @pytest.mark.parametrize('colour', [DARK, 110.0, 255.0])
-def test_an_edge_that_is_hidden_is_left_out(colour) -> None:
+def test_an_edge_that_is_hidden_is_left_out(colour: Any) -> None:
     """A bar over a quarter of the dot, whatever its colour, has edges that are not the dot's."""
     image = DISC.copy()
     image[:, 57:] = colour
@@ -134,7 +135,7 @@ def test_dots_do_not_depend_on_each_other() -> None:
 
 
 @pytest.mark.parametrize('deviation, least', [(1.0, 1.5), (2.0, 1.4), (6.0, 0.7)])
-def test_the_covariance_is_that_of_the_errors(deviation, least) -> None:
+def test_the_covariance_is_that_of_the_errors(deviation: float, least: float) -> None:
     """A hundred discs under noise: e' C^-1 e is 2 on average, with a standard error of 0.2.
 
     Strong noise is taken for light that is uneven, which makes the covariance too large.

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from ahf_ros.scenes.scene import SceneSettings, render
+from ahf_ros.scenes.scene import Rendering, SceneSettings, render
 from ahf_ros.vision import frame
 from ahf_ros.vision.dot_search import voted_dots, whole_dots, whole_outlines
 from ahf_ros.vision.dots import Dots
@@ -20,7 +20,7 @@ SIZES = (4.0, 60.0)
 
 
 @cache
-def scene(light: str):
+def scene(light: str) -> Rendering:
     return render(
         SceneSettings(
             width=1000, height=700, targets=9, dot_radius=18.0, light=light, ambient=0.12, seed=2
@@ -32,7 +32,7 @@ def first_edges(gray: np.ndarray) -> LogEdges:
     return image_pyramid(gray, 60.0).edges[0]
 
 
-def distances(dots: Dots, rendering) -> np.ndarray:
+def distances(dots: Dots, rendering: Rendering) -> np.ndarray:
     """Return the distances of the targets of a scene from the dot next to each, px."""
     centres = dots.frames[:, :2, 2]
     return np.array(
@@ -53,7 +53,7 @@ def test_whole_dots_of_a_scene_in_even_light_are_its_targets() -> None:
 
 
 @pytest.mark.parametrize('light', ['stripe', 'lattice'])
-def test_votes_find_dots_whose_outlines_are_interrupted(light) -> None:
+def test_votes_find_dots_whose_outlines_are_interrupted(light: str) -> None:
     rendering = scene(light)
     pyramid = image_pyramid(rendering.image, 60.0)
     assert distances(whole_dots(pyramid, *SIZES, (1,)), rendering).max() > 5
@@ -80,7 +80,7 @@ def test_votes_find_dots_whose_outlines_are_interrupted(light) -> None:
     ],
     ids=lambda view: ', '.join(map(str, view.values())),
 )
-def test_small_oblique_blurred_and_shaded_dots_are_found(view) -> None:
+def test_small_oblique_blurred_and_shaded_dots_are_found(view: dict[str, float | str]) -> None:
     few = {'width': 1200, 'height': 900, 'targets': 9}
     rendering = render(SceneSettings(**few, ambient=0.12, seed=4, **view))
     dots = voted_dots(image_pyramid(rendering.image, 60.0), *SIZES, (1,))
@@ -100,7 +100,7 @@ def test_edges_within_explained_outlines_do_not_vote() -> None:
 
 
 @pytest.mark.parametrize('level', [40, 200])
-def test_no_dots_in_an_image_of_one_edge_or_none(level) -> None:
+def test_no_dots_in_an_image_of_one_edge_or_none(level: int) -> None:
     gray = np.full((60, 80), 40, np.uint8)
     gray[:, 40:] = level
     pyramid = image_pyramid(gray, 60.0)
@@ -111,7 +111,7 @@ def test_no_dots_in_an_image_of_one_edge_or_none(level) -> None:
 
 @pytest.mark.parametrize('polarity', [1, -1])
 @pytest.mark.parametrize(('paper', 'ink'), [(200, 30), (70, 20)], ids=['lit', 'shadow'])
-def test_a_whole_outline_is_an_ellipse(polarity, paper, ink) -> None:
+def test_a_whole_outline_is_an_ellipse(polarity: int, paper: int, ink: int) -> None:
     colours = (paper, ink) if polarity == 1 else (ink, paper)
     dots = whole_outlines(first_edges(drawn([(100.3, 80.6, 14.0)], *colours)), 2, 30)
     assert dots.polarity.tolist() == [polarity]
@@ -129,7 +129,9 @@ def test_outlines_of_another_size_are_left_out() -> None:
     assert frame.enlarged(large, 1)[:, :2, 2] == pytest.approx(np.array([[200, 120]]), abs=0.5)
 
 
-def test_more_dots_than_are_looked_at_are_said_and_the_roundest_stay(monkeypatch) -> None:
+def test_more_dots_than_are_looked_at_are_said_and_the_roundest_stay(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     places = [(x, y) for x in range(20, 400, 40) for y in range(20, 400, 40)]
     dots = [(x, y, 9, 9 if y < 200 else 6, 0.5) for x, y in places]
     edges = find_edges(log_image(drawn(dots, shape=(400, 400))))

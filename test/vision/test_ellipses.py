@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import cv2
 import numpy as np
 import pytest
@@ -35,7 +37,9 @@ ELLIPSES = [
 
 @pytest.mark.parametrize('ellipse', ELLIPSES, ids=['round', 'tilted', 'oblique'])
 @pytest.mark.parametrize('polarity', [1, -1])
-def test_a_start_that_is_near_comes_onto_the_edge(ellipse, polarity) -> None:
+def test_a_start_that_is_near_comes_onto_the_edge(
+    ellipse: tuple[float, float, float, float, float], polarity: int
+) -> None:
     colours = (210, 30) if polarity == 1 else (30, 210)
     log = log_image(drawn([ellipse], *colours))
     x, y, major, minor, angle = ellipse
@@ -53,7 +57,7 @@ def test_a_start_that_is_near_comes_onto_the_edge(ellipse, polarity) -> None:
 
 @pytest.mark.parametrize('blur', [0.5, 2.0])
 @pytest.mark.parametrize('polarity', [1, -1])
-def test_the_size_of_a_dot_does_not_depend_on_its_blur(blur, polarity) -> None:
+def test_the_size_of_a_dot_does_not_depend_on_its_blur(blur: float, polarity: int) -> None:
     ellipse = (100.3, 90.6, 18.0, 15.0, 0.7)
     gray = drawn([ellipse], *((210, 30) if polarity == 1 else (30, 210)))
     log = log_image(cv2.GaussianBlur(gray, (0, 0), blur))
@@ -62,7 +66,7 @@ def test_the_size_of_a_dot_does_not_depend_on_its_blur(blur, polarity) -> None:
 
 
 @pytest.mark.parametrize('angle', [0.0, 0.8, 2.0])
-def test_an_edge_of_light_across_the_dot_moves_it_little(angle) -> None:
+def test_an_edge_of_light_across_the_dot_moves_it_little(angle: float) -> None:
     gray = half_in_shadow(drawn([(100.3, 90.6, 16.0, 14.0, 0.3)]), 104, 92, angle)
     dots = refined(log_image(gray), [(101.0, 90.0, 15.0, 15.0, 0.0)], [1])
     assert dots.share[0] > 0.7
@@ -85,7 +89,9 @@ def test_nothing_in_nothing_out() -> None:
 
 @pytest.mark.parametrize('level', [1, 2])
 @pytest.mark.parametrize('ellipse', ELLIPSES, ids=['round', 'tilted', 'oblique'])
-def test_an_ellipse_is_found_about_a_candidate(ellipse, level) -> None:
+def test_an_ellipse_is_found_about_a_candidate(
+    ellipse: tuple[float, float, float, float, float], level: int
+) -> None:
     x, y, major, minor, _ = ellipse
     scale = 2.0**level
     size = np.sqrt(major * minor) / scale
@@ -99,7 +105,7 @@ def test_an_ellipse_is_found_about_a_candidate(ellipse, level) -> None:
 
 
 @pytest.mark.parametrize('direction', np.arange(0, 6, 0.7))
-def test_a_circle_is_found_beside_a_candidate(direction) -> None:
+def test_a_circle_is_found_beside_a_candidate(direction: Any) -> None:
     x, y = 100.3 + 6 * np.cos(direction), 90.6 + 6 * np.sin(direction)
     candidate = Candidates(1, (np.array([[x, y]]) + 0.5) / 2 - 0.5, (5.8, 11.2), np.array([1]))
     gray = half_in_shadow(drawn([(100.3, 90.6, 13, 13, 0)]), 104, 92, 0.8)

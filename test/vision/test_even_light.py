@@ -25,7 +25,7 @@ def lit(reflectance: np.ndarray, period: int = 24) -> list[np.ndarray]:
 
 
 @pytest.mark.parametrize(('ground', 'ink', 'left'), [(0.8, 0.05, 0.5), (0.05, 0.8, 1.0)])
-def test_seams_go_and_the_print_stays(ground, ink, left) -> None:
+def test_seams_go_and_the_print_stays(ground: float, ink: float, left: float) -> None:
     reflectance = np.full((360, 480), ground)
     for x in range(40, 480, 80):
         cv2.circle(reflectance, (x, 180), 24, ink, -1)

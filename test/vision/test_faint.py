@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import cv2
 import numpy as np
 import pytest
@@ -39,12 +41,14 @@ ROWS, COLUMNS = np.mgrid[:384, :512].astype(np.float32)
     ],
     ids=['clear contrast', 'noise', 'gradient', 'soft spots', 'flat', 'one pixel'],
 )
-def test_nothing_is_stretched_without_clear_edges_of_faint_contrast(gray, noise) -> None:
+def test_nothing_is_stretched_without_clear_edges_of_faint_contrast(
+    gray: Any, noise: float
+) -> None:
     assert list(faint_parts(noisy(gray, noise))) == []
 
 
 @pytest.mark.parametrize(('paper', 'ink'), [(130, 110), (250, 180), (40, 28), (110, 130)])
-def test_faint_contrast_becomes_that_of_a_print(paper, ink) -> None:
+def test_faint_contrast_becomes_that_of_a_print(paper: int, ink: int) -> None:
     image = noisy(discs(paper, ink), 0.7)
     (part,) = faint_parts(image)
     assert (part.x, part.y, part.gray.shape) == (0, 0, image.shape)

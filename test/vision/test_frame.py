@@ -22,7 +22,7 @@ def test_an_affine_frame_maps_the_unit_circle_onto_its_ellipse() -> None:
 
 
 @pytest.mark.parametrize('degrees', [-89, -30, 0, 45, 90])
-def test_axes_of_an_affine_frame_are_those_it_was_made_of(degrees) -> None:
+def test_axes_of_an_affine_frame_are_those_it_was_made_of(degrees: int) -> None:
     angle = np.deg2rad(degrees)
     major, minor, direction = frame.ellipse_axes(frame.affine_frames([1], [2], [9], [6], [angle]))
     assert (major[0], minor[0]) == pytest.approx((9, 6))
@@ -45,7 +45,7 @@ def test_each_frame_projects_points_of_its_own() -> None:
 
 
 @pytest.mark.parametrize('unknown', range(7))
-def test_the_basis_says_how_circles_move(unknown) -> None:
+def test_the_basis_says_how_circles_move(unknown: int) -> None:
     changes = np.zeros((1, 7))
     changes[0, unknown] = 1e-5
     radii = np.array([1.0, 3.0])

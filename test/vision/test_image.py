@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -9,7 +11,9 @@ RAMP = np.arange(20 * 30).reshape(20, 30) % 251
 
 
 @pytest.mark.parametrize('kind', IMAGE_TYPES)
-def test_every_accepted_type_passes_in_any_order_read_only_and_in_the_smallest_size(kind) -> None:
+def test_every_accepted_type_passes_in_any_order_read_only_and_in_the_smallest_size(
+    kind: Any,
+) -> None:
     image = RAMP.astype(kind)
     image.flags.writeable = False
     check_image(image[::-1])
@@ -43,6 +47,6 @@ def test_every_accepted_type_passes_in_any_order_read_only_and_in_the_smallest_s
         ((RAMP - 2.5).astype(np.float32), 'down to -2.5'),
     ],
 )
-def test_everything_else_is_refused_by_name(image, words) -> None:
+def test_everything_else_is_refused_by_name(image: np.ndarray, words: str) -> None:
     with pytest.raises(ValueError, match=f'^frame .*{words}.*accepted'):
         check_image(image, 'frame')

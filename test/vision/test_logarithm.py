@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,7 +15,7 @@ RAMP = np.arange(256, dtype=np.uint8).reshape(16, 16)
 @pytest.mark.parametrize(
     ('depth', 'kind'), [(8, np.uint8), *((depth, np.uint16) for depth in (8, 10, 12, 16))]
 )
-def test_the_range_of_integers_is_that_of_their_depth(depth, kind) -> None:
+def test_the_range_of_integers_is_that_of_their_depth(depth: int, kind: Any) -> None:
     image = (RAMP / 255 * (2**depth - 1)).astype(kind)
     expected = np.log(image / (2**depth - 1) + 0.01)
     np.testing.assert_allclose(logarithm(image, 0.01), expected, rtol=0, atol=1e-6)
@@ -27,7 +28,7 @@ def test_a_dark_16_bit_image_is_not_taken_for_a_bright_one() -> None:
 
 @pytest.mark.parametrize('kind', [np.float32, np.float64])
 @pytest.mark.parametrize('unit', [1e-30, 1.0, 1e30])
-def test_the_unit_of_a_float_image_does_not_matter(kind, unit) -> None:
+def test_the_unit_of_a_float_image_does_not_matter(kind: Any, unit: float) -> None:
     expected = np.log(RAMP / 255 + 0.01)
     image = (RAMP * kind(unit)).astype(kind)
     np.testing.assert_allclose(logarithm(image, 0.01), expected, rtol=0, atol=1e-5)
@@ -55,7 +56,7 @@ def test_a_flat_image_is_not_stretched_to_its_rounding() -> None:
 
 
 @pytest.mark.parametrize('shape', [(16, 20), (33, 2000), (2656, 3984)])
-def test_the_lattice_is_inside_ascending_and_the_same_every_time(shape) -> None:
+def test_the_lattice_is_inside_ascending_and_the_same_every_time(shape: tuple[int, int]) -> None:
     for places, length in zip(sample_lattice(*shape), shape, strict=True):
         assert places[0] >= 0
         assert places[-1] < length

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import cache
+from typing import Any
 
 import cv2
 import numpy as np
@@ -34,7 +35,9 @@ LIGHTS = [('normal', 0.3), ('stripe', 0.02), ('lattice', 0.3), ('fringe', 0.3), 
 
 @pytest.mark.lasting
 @pytest.mark.parametrize(('light', 'ambient'), LIGHTS)
-def test_light_that_moves_is_no_movement_and_a_scene_that_moves_is(light, ambient) -> None:
+def test_light_that_moves_is_no_movement_and_a_scene_that_moves_is(
+    light: str, ambient: float
+) -> None:
     first, *others = images(light, ambient)
     edges = find_edges(first)
     assert [displacement(edges, other) for other in others] == [None, None]
@@ -76,14 +79,16 @@ def test_large_displacements_are_found_in_a_smaller_image() -> None:
     ],
     ids=['fine stripes by half their period', 'a lattice in the dark'],
 )
-def test_light_that_is_like_itself_elsewhere_is_no_movement(changes, phase) -> None:
+def test_light_that_is_like_itself_elsewhere_is_no_movement(
+    changes: dict[str, float | str] | dict[str, int | str], phase: int
+) -> None:
     scene = SceneSettings(**SMALL, **changes)
     first, second = (render(scene, of).image for of in (0, phase))
     assert displacement(find_edges(first), second) is None
 
 
 @pytest.mark.parametrize('size', [(16, 16), (40, 60)])
-def test_images_without_edges_do_not_move(size) -> None:
+def test_images_without_edges_do_not_move(size: tuple[int, int]) -> None:
     flat = np.full(size, 90, np.uint8)
     flat[0, 0] = 91
     assert displacement(find_edges(flat), flat) is None
@@ -114,5 +119,7 @@ def targets(x: float, noise: float) -> list[Target]:
         (Displacement(0.9, 0.1, 0.05, (0, 0, 10, 10)), 0.9, 0.05, None),
     ],
 )
-def test_targets_tell_a_movement_or_too_few_do(moved, shift, noise, told) -> None:
+def test_targets_tell_a_movement_or_too_few_do(
+    moved: Any, shift: float, noise: float, told: bool | None
+) -> None:
     assert targets_moved(moved, targets(0.0, 0.0), targets(shift, noise)) is told

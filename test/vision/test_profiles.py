@@ -37,7 +37,7 @@ def measured(image: np.ndarray, blur: float, polarity: int = 1) -> Edges:
 
 @pytest.mark.parametrize('blur', [0.6, 0.8, 1.2])
 @pytest.mark.parametrize('place', [-0.73, 0.0, 0.2, 0.5])
-def test_a_step_is_found_where_it_is(place, blur) -> None:
+def test_a_step_is_found_where_it_is(place: float, blur: float) -> None:
     edges = measured(step_image(place, blur), blur)
     # Interpolation between pixels is more blur, which tells in a step far from the middle.
     assert edges.offset[0, 0] == pytest.approx(place, abs=0.015 + 0.04 * abs(place))
@@ -54,7 +54,7 @@ def test_a_step_down_is_found_where_it_is() -> None:
 
 
 @pytest.mark.parametrize('slope', [-0.04, 0.04])
-def test_a_slope_of_the_light_is_seen_and_says_how_far_it_moves_the_step(slope) -> None:
+def test_a_slope_of_the_light_is_seen_and_says_how_far_it_moves_the_step(slope: float) -> None:
     """Without the correction the place is wrong by several times what is left with it."""
     flat = measured(step_image(0.0, 0.9), 0.9)
     edges = measured(step_image(0.0, 0.9, slope), 0.9)

@@ -49,7 +49,7 @@ def test_no_dot_of_an_octave_is_larger_than_those_of_the_first() -> None:
 @pytest.mark.parametrize(
     ('low', 'high', 'count'), [(4.0, 60.0, 1), (4.0, 100.0, 2), (150.0, 160.0, 1), (9.0, 8.0, 0)]
 )
-def test_bounds_are_obeyed(low, high, count) -> None:
+def test_bounds_are_obeyed(low: float, high: float, count: int) -> None:
     every = bounds(low, high)
     assert len(every) == count
     assert all(low <= start <= end <= high for start, end in every)
@@ -72,7 +72,7 @@ def test_a_step_is_as_high_in_the_shadow_as_in_the_light() -> None:
 
 
 @pytest.mark.parametrize('shape', [(64, 48), (65, 49), (16, 17)])
-def test_a_pixel_of_the_pyramid_is_the_mean_of_four(shape) -> None:
+def test_a_pixel_of_the_pyramid_is_the_mean_of_four(shape: tuple[int, int]) -> None:
     image = np.random.default_rng(0).integers(0, 256, shape).astype(np.uint8)
     first, second, third, _ = halved(image, 3)
     height, width = shape[0] // 2, shape[1] // 2

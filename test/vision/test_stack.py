@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import cv2
 import numpy as np
 import pytest
@@ -17,7 +19,7 @@ def lit(phase: int, kind: type = np.uint8, white: int = 255) -> np.ndarray:
     return np.rint(REFLECTANCE * light * (white / 255)).astype(kind)
 
 
-def both(**options) -> ImageStack:
+def both(**options: Any) -> ImageStack:
     return ImageStack((lit(0, **options), lit(1, **options)))
 
 
@@ -47,7 +49,7 @@ def test_the_quotient_shows_what_shines_in_one_of_the_lights() -> None:
     ('kind', 'white'), [(np.uint16, 4095), (np.float32, 3.0), (np.float64, 7e5)]
 )
 @pytest.mark.parametrize('name', ['even_light', 'largest', 'mean_light', 'mean_gray'])
-def test_combinations_have_the_pixels_of_the_images(kind, white, name) -> None:
+def test_combinations_have_the_pixels_of_the_images(kind: Any, white: float, name: str) -> None:
     images = tuple((lit(phase) / 255 * white).astype(kind) for phase in (0, 1))
     combined = ImageStack(images).combined(name)
     assert combined.dtype == kind
@@ -55,7 +57,7 @@ def test_combinations_have_the_pixels_of_the_images(kind, white, name) -> None:
 
 
 @pytest.mark.parametrize('name', COMBINATIONS)
-def test_the_order_of_the_images_and_their_memory_do_not_matter(name) -> None:
+def test_the_order_of_the_images_and_their_memory_do_not_matter(name: str) -> None:
     first, second = lit(0), np.asfortranarray(lit(1))
     combined = ImageStack((first, second)).combined(name)
     assert combined.flags.c_contiguous
@@ -96,7 +98,7 @@ def test_averaging_reduces_noise() -> None:
         ((lit(0)[0],), r'image has shape \(32,\)'),
     ],
 )
-def test_images_that_do_not_fit_are_named(images, message) -> None:
+def test_images_that_do_not_fit_are_named(images: Any, message: str) -> None:
     with pytest.raises(ValueError, match=message):
         ImageStack(images)
 
