@@ -27,7 +27,7 @@ from ahf_ros.network.network import ControlPoint, Network, ScaleBar
 from ahf_ros.network.points import MeasuredPoints, entries
 from ahf_ros.network.refinement import refine
 from ahf_ros.network.similarity import similarity_between
-from ahf_ros.network.solution import Solution, Start
+from ahf_ros.network.solution import NetworkState, Solution
 from ahf_ros.network.suspects import Misclosures
 from benchmarks.report import number, progress
 from benchmarks.report import table as markdown
@@ -89,9 +89,9 @@ def ellipsoids_table(seeds: Sequence[int], runs: int = 125) -> list[str]:
     return lines
 
 
-def coverage(solution: Solution, truth: Start) -> float:
+def coverage(solution: Solution, truth: NetworkState) -> float:
     """Return the share of points whose 95 % ellipsoid holds the truth."""
-    points = solution.start.points
+    points = solution.state.points
     found = np.isfinite(points[:, 0])
     movement = similarity_between(truth.points[found], points[found])
     error = points[found] - movement.moved(truth.points[found])
@@ -128,7 +128,7 @@ def counted(field: Field, random: np.random.Generator) -> tuple[int, int, int, i
     network, wrong = with_wrong_ids(network, random)
     start = refine(network, approximate(truth, random), ('f', 'k1'))
     solution = adjust(network, start)
-    observations, used = network.observations, solution.start.used
+    observations, used = network.observations, solution.state.used
     right = (observations.point == 0) & ~wrong
     balance = 2 * (late & right).sum() - right.sum()
     if balance > 0 or (balance == 0 and (used & late & right).any()):
@@ -147,7 +147,7 @@ def counted(field: Field, random: np.random.Generator) -> tuple[int, int, int, i
 
 
 def with_moved_target(
-    network: Network, truth: Start, random: np.random.Generator
+    network: Network, truth: NetworkState, random: np.random.Generator
 ) -> tuple[Network, np.ndarray, np.ndarray]:
     """Return a network whose target 0 moves halfway, its second place, and the rows there."""
     observations = network.observations
@@ -186,10 +186,10 @@ def with_wrong_ids(network: Network, random: np.random.Generator) -> tuple[Netwo
     return replace(network, observations=replace(observations, point=point)), wrong
 
 
-def nees(solution: Solution, truth: Start) -> float:
+def nees(solution: Solution, truth: NetworkState) -> float:
     """Return the normalised squared error of all points over its degrees of freedom."""
     some = np.flatnonzero(solution.determined)
-    points, rows = solution.start.points[some], entries(some)
+    points, rows = solution.state.points[some], entries(some)
     moved = similarity_between(truth.points[some], points).moved(truth.points[some])
     values, vectors = np.linalg.eigh(solution.covariance_of_points[np.ix_(rows, rows)])
     real = values > _RANK * values[-1]
@@ -208,8 +208,8 @@ def lenses_table(seeds: Sequence[int], runs: int) -> list[str]:
             network, truth = simulate(field, random, _lenses(cameras, random))
             solution = adjust(network, approximate(truth, random, 0.005))
             sigma = np.sqrt([np.diag(it) for it in solution.camera_covariances])
-            errors = np.abs(solution.start.calibrations - truth.calibrations) / sigma
-            lost = len(network.observations.xy) - int(solution.start.used.sum())
+            errors = np.abs(solution.state.calibrations - truth.calibrations) / sigma
+            lost = len(network.observations.xy) - int(solution.state.used.sum())
             found.append(
                 (nees(solution, truth), 100 * coverage(solution, truth), (errors > 3).mean(), lost)
             )
@@ -271,7 +271,7 @@ def tails_table(seeds: Sequence[int], runs: int) -> list[str]:
             start = approximate(truth, random, 0.005)
             solution = adjust(network, start)
             knowing = adjust(network, replace(start, used=~gross), test=False)
-            used = solution.start.used
+            used = solution.state.used
             found.append(
                 (
                     (used & ~gross).sum(),
@@ -305,7 +305,7 @@ def tails_table(seeds: Sequence[int], runs: int) -> list[str]:
 
 
 def _disturbed(
-    network: Network, truth: Start, freedom: float, random: np.random.Generator
+    network: Network, truth: NetworkState, freedom: float, random: np.random.Generator
 ) -> tuple[Network, np.ndarray, np.ndarray]:
     """Return a network with t-distributed errors and gross ones, which, and which are large."""
     seen = network.observations
@@ -324,7 +324,7 @@ def _disturbed(
     return replace(network, observations=replace(seen, xy=exact + error)), gross, large
 
 
-def _exact(network: Network, truth: Start) -> np.ndarray:
+def _exact(network: Network, truth: NetworkState) -> np.ndarray:
     """Return the image points (m, 2) without errors."""
     seen = network.observations
     return project(
@@ -335,9 +335,9 @@ def _exact(network: Network, truth: Start) -> np.ndarray:
     )
 
 
-def _rms(solution: Solution, truth: Start) -> float:
+def _rms(solution: Solution, truth: NetworkState) -> float:
     some = solution.determined
-    points = solution.start.points[some]
+    points = solution.state.points[some]
     moved = similarity_between(truth.points[some], points).moved(truth.points[some])
     return float(np.sqrt(((points - moved) ** 2).mean()))
 
@@ -359,7 +359,7 @@ def told_table(seeds: Sequence[int], runs: int) -> list[str]:
             alone = images.measured_points
             told, wrong, size = _told(kind, count, (sigma, real), truth, alone, random)
             network = replace(network, **told)
-            solution = adjust(network, images.start)
+            solution = adjust(network, images.state)
             clear = [it.name for it in solution.suspects if not it.rivals]
             either = {name for it in solution.suspects for name in (it.name, *it.rivals)}
             found.append(
@@ -369,7 +369,7 @@ def told_table(seeds: Sequence[int], runs: int) -> list[str]:
                     wrong in clear,
                     wrong in either and wrong not in clear,
                     sum(name != wrong for name in clear),
-                    len(network.observations.xy) - int(solution.start.used.sum()),
+                    len(network.observations.xy) - int(solution.state.used.sum()),
                 )
             )
         large, apart, named, unclear, good, rays = np.array(found).T
@@ -388,7 +388,9 @@ def told_table(seeds: Sequence[int], runs: int) -> list[str]:
     return markdown(head, rows)
 
 
-def _separation(network: Network, truth: Start, alone: MeasuredPoints, added: float) -> float:
+def _separation(
+    network: Network, truth: NetworkState, alone: MeasuredPoints, added: float
+) -> float:
     """Return by how many sigma the error of the first one differs from any of another one.
 
     Variances of what is told are larger than it is said by `added`.
@@ -419,7 +421,7 @@ def _told(
     kind: str,
     count: int,
     sigmas: tuple[float, float],
-    truth: Start,
+    truth: NetworkState,
     alone: MeasuredPoints,
     random: np.random.Generator,
 ) -> tuple[dict[str, Any], str, float]:

@@ -69,7 +69,7 @@ def outcome(seen: Rendered) -> str:
         solution = orient(seen.network)[0]
     except ValueError:
         return 'refused'
-    start = solution.start
+    start = solution.state
     known = np.flatnonzero(np.isfinite(start.points[:, 0]))
     rows = (3 * known[:, None] + np.arange(3)).ravel()
     variances = np.diag(solution.covariance_of_points)[rows].reshape(-1, 3).sum(axis=1)
@@ -140,10 +140,10 @@ def panel_table(network: Network, folder: Path) -> list[str]:
             for row in changed
         }
         clean = orient(_without(network, changed))[0]
-        both = np.isfinite(solution.start.points[:, 0]) & np.isfinite(clean.start.points[:, 0])
+        both = np.isfinite(solution.state.points[:, 0]) & np.isfinite(clean.state.points[:, 0])
         reference = np.array([truth[name] for name in np.array(network.targets)[both]])
         first, second = (
-            deviations(one.start.points[both], reference) for one in (clean, solution)
+            deviations(one.state.points[both], reference) for one in (clean, solution)
         )
         moved = float(np.linalg.norm(first - second, axis=1).max())
         rows.append((*_against(solution, truth), f'{len(asked & named)} of {len(asked)}', moved))
@@ -181,7 +181,7 @@ def _without(network: Network, rows: IntArray) -> Network:
 
 def _against(solution: Solution, truth: dict[str, list[float]]) -> tuple[float, float, float, int]:
     """Return the RMS distance from measured points in mm, and residuals."""
-    start, names = solution.start, solution.network.targets
+    start, names = solution.state, solution.network.targets
     known = [index for index in np.flatnonzero(np.isfinite(start.points[:, 0]))]
     known = [index for index in known if names[index] in truth]
     apart = deviations(start.points[known], np.array([truth[names[index]] for index in known]))

@@ -17,7 +17,7 @@ from ahf_ros.network.adjustment import adjust
 from ahf_ros.network.camera import PARAMETERS, pinhole, undistort
 from ahf_ros.network.network import CameraView, ControlPoint, Network, Observations
 from ahf_ros.network.refinement import refine
-from ahf_ros.network.solution import Solution, Start
+from ahf_ros.network.solution import NetworkState, Solution
 
 WIDTH, HEIGHT = 2272, 1704
 PIXEL = 5.43764 / HEIGHT  # mm, its height
@@ -54,7 +54,7 @@ def network(path: Path) -> Network:
     )
 
 
-def start(path: Path, sheet: Network) -> Start:
+def start(path: Path, sheet: Network) -> NetworkState:
     """Return DBAT's stations to 1 cm and 1 degree, and points in the plane of the sheet."""
     lines = (path / 'result_camera_stations.txt').read_text(encoding='utf-8').splitlines()
     values = np.array([line.split(',')[2:8] for line in lines if line[:1] != '#'], dtype=float)
@@ -71,7 +71,7 @@ def start(path: Path, sheet: Network) -> Start:
     points = np.array(
         [np.median(crossings[observations.point == k], axis=0) for k in range(len(sheet.targets))]
     )
-    return Start(
+    return NetworkState(
         calibration[None], rotations, positions, points, np.ones(len(observations.xy), dtype=bool)
     )
 
@@ -81,7 +81,7 @@ def solve(path: Path) -> Solution:
     sheet = network(path)
     first = refine(sheet, start(path, sheet), ('f', 'k1'))
     every = np.ones(len(first.used), dtype=bool)
-    first = Start(first.calibrations, first.rotations, first.positions, first.points, every)
+    first = NetworkState(first.calibrations, first.rotations, first.positions, first.points, every)
     return adjust(sheet, first, release=RELEASED, test=False, backward=True)
 
 
@@ -107,7 +107,7 @@ def in_dbat_units(solution: Solution) -> tuple[np.ndarray, np.ndarray]:
             ]
         )
 
-    calibration = solution.start.calibrations[0]
+    calibration = solution.state.calibrations[0]
     steps = 1e-6 * np.maximum(np.abs(calibration), 1)
     jacobian = np.stack(
         [

@@ -26,11 +26,11 @@ def epoch(
     The scale is that of a bar from target 1 to target 2; there is none if the unit is empty.
     """
     made = solution(unit=unit)
-    points = made.start.points.copy()
+    points = made.state.points.copy()
     bar = ScaleBar(('1', '2'), float(np.linalg.norm(points[0] - points[1])), 0.005)
     for name, step in (moved or {}).items():
         points[made.network.targets.index(name)] += step
-    seen, start = made.network.observations, replace(made.start, points=points)
+    seen, start = made.network.observations, replace(made.state, points=points)
     exact = np.array(
         [
             project(

@@ -8,7 +8,7 @@ import numpy as np
 
 from ahf_ros.network.camera import pinhole, project, rotation_matrices
 from ahf_ros.network.network import CameraView, Network, Observations
-from ahf_ros.network.solution import Start
+from ahf_ros.network.solution import NetworkState
 
 WIDTH, HEIGHT = 4000, 3000
 
@@ -38,7 +38,7 @@ def simulate(
     random: np.random.Generator,
     lenses: np.ndarray = LENS[None],
     targets: np.ndarray | None = None,
-) -> tuple[Network, Start]:
+) -> tuple[Network, NetworkState]:
     """Return a network with noise in its image points, and the true values.
 
     Standard deviations of centres vary by a factor of two, and are those of the noise. Cameras of
@@ -81,10 +81,12 @@ def simulate(
         ),
     )
     used = np.ones(len(xy), dtype=bool)
-    return network, Start(lenses, rotations, positions, points, used)
+    return network, NetworkState(lenses, rotations, positions, points, used)
 
 
-def approximate(truth: Start, random: np.random.Generator, size: float = 0.02) -> Start:
+def approximate(
+    truth: NetworkState, random: np.random.Generator, size: float = 0.02
+) -> NetworkState:
     """Return true values with errors of a size in units and rad, and no distortion."""
     count = len(truth.positions)
     turns = rotation_matrices(random.normal(0, size, (count, 3)))

@@ -18,7 +18,7 @@ from ahf_ros.network.network import (
     Observations,
     ScaleBar,
 )
-from ahf_ros.network.solution import Solution, Start
+from ahf_ros.network.solution import NetworkState, Solution
 
 SIZE = 1600, 1200
 CALIBRATION = np.array([1500.0, 803.0, 596.0, -0.08, 0.02, 0.001, 2e-4, -1e-4, 1e-4, 2e-5])
@@ -31,7 +31,7 @@ def simulated(
     sigma: float = 0.02,
     seed: int = 7,
     calibration: FloatArray | None = None,
-) -> tuple[Network, Start]:
+) -> tuple[Network, NetworkState]:
     """Return image points with noise of `sigma` px, and the values that they come from.
 
     The targets are in a volume of 600 x 400 x 200, and every photograph shows all of them. Every
@@ -59,7 +59,7 @@ def simulated(
         ),
     )
     used = np.ones(len(exact), np.bool_)
-    return network, Start(lens[None], rotations, positions, points, used)
+    return network, NetworkState(lens[None], rotations, positions, points, used)
 
 
 def _looking(position: FloatArray, roll: float) -> FloatArray:
@@ -75,7 +75,7 @@ def _looking(position: FloatArray, roll: float) -> FloatArray:
 
 def known(network: Network) -> Network:
     """Return a network with scale bars and control points, one of each a check."""
-    points = solution().start.points
+    points = solution().state.points
     bars = [
         ScaleBar(
             (network.targets[a], network.targets[b]),
@@ -105,7 +105,7 @@ def solution(photographs: int = 6, targets: int = 12, unit: str = 'mm') -> Solut
     sigmas = np.array([0.3, 0.2, 0.2, 1e-4, 1e-4, 1e-4, 1e-6, 1e-6, 0, 0])
     return Solution(
         network=replace(network, unit=unit),
-        start=start,
+        state=start,
         residuals=errors,
         normalised=np.hypot(*errors.T) / 0.02,
         camera_covariances=(np.diag(sigmas**2),),

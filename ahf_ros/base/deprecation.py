@@ -61,5 +61,10 @@ def deprecated_arguments(
     return decorate
 
 
-def _warn(text: str) -> None:
-    warnings.warn(text, DeprecationWarning, stacklevel=3)
+def _warn(text: str, level: int = 3) -> None:
+    warnings.warn(text, DeprecationWarning, stacklevel=level)
+
+
+def warn_of_name(owner: str, old: str, new: str) -> None:
+    """Warn whoever called what called this by a name that is given up."""
+    _warn(f'{owner} calls {old} {new} now', 4)

@@ -23,7 +23,7 @@ from ahf_ros.network.progress import stage
 from ahf_ros.network.refinement import NEEDED, agreeing, free_parameters
 from ahf_ros.network.rejection import Adjusted, adjusted, rejections, relocated, tested
 from ahf_ros.network.similarity import similarity_between
-from ahf_ros.network.solution import Solution, Start
+from ahf_ros.network.solution import NetworkState, Solution
 from ahf_ros.network.suspects import examined
 from ahf_ros.network.testing import CRITICAL, MISFIT
 
@@ -38,7 +38,7 @@ _MISFITS = (
 
 def adjust(
     network: Network,
-    start: Start,
+    start: NetworkState,
     datum: Datum | None = None,
     release: tuple[str, ...] | None = None,
     test: bool = True,
@@ -55,7 +55,7 @@ def adjust(
     ----------
     network : Network
         What was observed and is known.
-    start : Start
+    start : NetworkState
         Approximate values, in any frame and scale. Photographs and points that are NaN are no
         part of the adjustment.
     datum : Datum, optional
@@ -107,7 +107,7 @@ def adjust(
     >>> network = Network(names[0], np.zeros(6, int), cameras, names[1], seen)
     >>> positions = np.array([-5 * it[2] for it in rotations])
     >>> used = np.ones(len(xy), bool)
-    >>> start = Start(lens[None], np.array(rotations), positions, points + 0.01, used)
+    >>> start = NetworkState(lens[None], np.array(rotations), positions, points + 0.01, used)
     >>> solution = adjust(network, start)
     >>> float(np.abs(solution.residuals).max()) < 1e-6
     True
@@ -145,7 +145,7 @@ class _Model:
     lenses: FloatArray | None
     backward: bool
 
-    def lay_out(self, state: Start, datum: Datum = _INNER) -> Layout:
+    def lay_out(self, state: NetworkState, datum: Datum = _INNER) -> Layout:
         """Return the layout of the used observations."""
         control = {point.name for point in self.network.control if not point.check}
         known = np.isin(self.network.targets, list(control))
@@ -165,7 +165,7 @@ class _Model:
         """Return what is known beside the photographs."""
         return knowledge(layout, gathered(self.network, layout, datum, self.lenses))
 
-    def approximate(self, state: Start) -> Start:
+    def approximate(self, state: NetworkState) -> NetworkState:
         """Return values after a robust adjustment."""
         stage(
             'robust adjustment',
@@ -178,7 +178,7 @@ class _Model:
         spread = max(1.0, normals.robust_spread(normals.whitened_lengths(layout, state)))
         return relocated(self.network, state, layout, CRITICAL * spread)
 
-    def adjusted(self, state: Start, datum: Datum) -> Adjusted:
+    def adjusted(self, state: NetworkState, datum: Datum) -> Adjusted:
         """Return the adjustment in a datum."""
         return adjusted(
             self.network,
@@ -188,7 +188,7 @@ class _Model:
         )
 
 
-def _tested(model: _Model, start: Start, datum: Datum, keep_suspects: bool) -> Solution:
+def _tested(model: _Model, start: NetworkState, datum: Datum, keep_suspects: bool) -> Solution:
     """Return the solution: of photographs alone, then with what of the rest they believe."""
     network = model.network
     alone = replace(model, network=replace(network, bars=(), control=()))

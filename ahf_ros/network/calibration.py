@@ -18,7 +18,7 @@ import numpy as np
 from ahf_ros.network.camera import PARAMETERS, known_calibration, parameters_of
 from ahf_ros.network.network import CameraView, FloatArray, IntArray, Network
 from ahf_ros.network.normals import Layout
-from ahf_ros.network.solution import Start
+from ahf_ros.network.solution import NetworkState
 
 USUAL = {
     'k1': 0.2,
@@ -82,7 +82,7 @@ def usual(
 
 
 def undetermined(
-    network: Network, layout: Layout, state: Start, rest: FloatArray
+    network: Network, layout: Layout, state: NetworkState, rest: FloatArray
 ) -> tuple[str, ...]:
     """Return warnings of cameras whose focal length is as uncertain as it was before."""
     column = layout.columns[:, 0]
@@ -105,7 +105,7 @@ def unlike_given(network: Network, calibrations: FloatArray) -> tuple[str, ...]:
 
 
 def unlike_pixels(
-    network: Network, layout: Layout, state: Start, rest: FloatArray
+    network: Network, layout: Layout, state: NetworkState, rest: FloatArray
 ) -> tuple[str, ...]:
     """Return warnings of cameras whose affinity or shear is larger than that of any sensor.
 

@@ -20,7 +20,7 @@ from ahf_ros.network.datum import Datum, movements
 from ahf_ros.network.least_squares import Conditions, Knowledge
 from ahf_ros.network.network import ControlPoint, FloatArray, IntArray, Network, ScaleBar
 from ahf_ros.network.normals import Layout
-from ahf_ros.network.solution import Start
+from ahf_ros.network.solution import NetworkState
 
 _NO_VARIANCE = 1e-14  # of a direction, relative to the largest of the point
 _DETERMINED = (
@@ -93,7 +93,7 @@ def kind(network: Network, datum: Datum) -> str:
 def knowledge(layout: Layout, known: Known) -> Knowledge:
     """Return the conditions of bars, control points and datum as a function of the values."""
 
-    def conditions(state: Start) -> Conditions:
+    def conditions(state: NetworkState) -> Conditions:
         points = state.points[layout.points]
         parts = [of_bars(known, points), of_control(known, points)]
         parts.append(_of_datum(known, points, np.concatenate([part[0] for part in parts])))

@@ -18,7 +18,7 @@ from ahf_ros.network import normals
 from ahf_ros.network.network import FloatArray
 from ahf_ros.network.normals import Layout, Normals, Reduced
 from ahf_ros.network.progress import iteration
-from ahf_ros.network.solution import Start
+from ahf_ros.network.solution import NetworkState
 
 Loss = Literal['squares', 'cauchy']
 
@@ -73,13 +73,17 @@ class Conditions:
         return self.rows[hard].T, self.gaps[hard]
 
 
-Knowledge = Callable[[Start], Conditions]
+Knowledge = Callable[[NetworkState], Conditions]
 """What is known beside image points, and the datum, at approximate values."""
 
 
 def minimise(
-    layout: Layout, state: Start, knowledge: Knowledge, loss: Loss = 'squares', rounds: int = 50
-) -> tuple[Start, bool]:
+    layout: Layout,
+    state: NetworkState,
+    knowledge: Knowledge,
+    loss: Loss = 'squares',
+    rounds: int = 50,
+) -> tuple[NetworkState, bool]:
     """Return the values of least loss, and whether the iterations converged in these rounds.
 
     A robust loss acts on residuals over their standard deviation, or over their robust spread
@@ -119,7 +123,7 @@ def minimise(
 
 
 def normal_equations(
-    layout: Layout, state: Start, knowledge: Knowledge
+    layout: Layout, state: NetworkState, knowledge: Knowledge
 ) -> tuple[Reduced, FloatArray]:
     """Return the reduced normal equations at converged values, and their border (u, h)."""
     design = normals.linearise(layout, state)

@@ -9,7 +9,7 @@ import numpy as np
 
 from ahf_ros.network.camera import PARAMETERS, undistort
 from ahf_ros.network.network import FloatArray, Network
-from ahf_ros.network.solution import Solution, Start
+from ahf_ros.network.solution import NetworkState, Solution
 
 _BORDER = 0.8  # share of the image points that are nearer to the principal point
 _FEWEST = 10  # image points at the border that do not fit
@@ -29,15 +29,15 @@ def unsuitable_lenses(solution: Solution) -> tuple[str, ...]:
     )
 
 
-def with_fisheye_lenses(solution: Solution) -> tuple[Network, Start] | None:
+def with_fisheye_lenses(solution: Solution) -> tuple[Network, NetworkState] | None:
     """Return the network whose lenses are equidistant where Brown's model fits only the middle.
 
     None where there are none. Calibrations that are kept fixed stay.
     """
     network, seen = solution.network, solution.network.observations
-    views, calibrations = list(network.cameras), solution.start.calibrations.copy()
+    views, calibrations = list(network.cameras), solution.state.calibrations.copy()
     for camera, *_ in _misfits(solution):
-        rows = solution.start.used & (network.camera_of[seen.photograph] == camera)
+        rows = solution.state.used & (network.camera_of[seen.photograph] == camera)
         view = views[camera]
         if view.fixed or view.equidistant:
             continue
@@ -46,7 +46,7 @@ def with_fisheye_lenses(solution: Solution) -> tuple[Network, Start] | None:
             calibrations[camera, PARAMETERS.index('k1') :] = 0
     if tuple(views) == network.cameras:
         return None
-    start = replace(solution.start, calibrations=calibrations)
+    start = replace(solution.state, calibrations=calibrations)
     return replace(network, cameras=tuple(views)), start
 
 
@@ -73,9 +73,9 @@ def _misfits(solution: Solution) -> Iterator[tuple[int, float, float, float]]:
         rows = np.flatnonzero(known & (network.camera_of[seen.photograph] == camera))
         if not len(rows):
             continue
-        radius = _radius(solution.start.calibrations[camera], seen.xy[rows])
+        radius = _radius(solution.state.calibrations[camera], seen.xy[rows])
         limit = float(np.quantile(radius, _BORDER))
-        off, border = ~solution.start.used[rows], radius > limit
+        off, border = ~solution.state.used[rows], radius > limit
         often, rest = float(off[border].mean()), float(off[~border].mean())
         if off[border].sum() >= _FEWEST and often >= max(_OFTEN[0], _OFTEN[1] * rest):
             yield camera, limit, often, rest

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from ahf_ros.network import camera
 from ahf_ros.network.network import FloatArray, IntArray, Network
-from ahf_ros.network.solution import Start
+from ahf_ros.network.solution import NetworkState
 
 _FEWEST_POINTS = 3  # of a photograph: six coordinates determine a pose
 _FEWEST_RAYS = 2  # of a point
@@ -102,7 +102,7 @@ class Normals:
 
 def lay_out(
     network: Network,
-    start: Start,
+    start: NetworkState,
     used: NDArray[np.bool_],
     free: NDArray[np.bool_],
     *,
@@ -165,7 +165,7 @@ def extended(network: Network, layout: Layout) -> Layout:
     )
 
 
-def predicted_in_front(network: Network, start: Start) -> NDArray[np.bool_]:
+def predicted_in_front(network: Network, start: NetworkState) -> NDArray[np.bool_]:
     """Return which observations (m,) have a pose, and a point in front of it."""
     observations = network.observations
     rotation = start.rotations[observations.photograph, 2]
@@ -173,13 +173,15 @@ def predicted_in_front(network: Network, start: Start) -> NDArray[np.bool_]:
     return np.einsum('mi,mi->m', rotation, ray) > 0
 
 
-def residuals(layout: Layout, state: Start) -> FloatArray:
+def residuals(layout: Layout, state: NetworkState) -> FloatArray:
     """Return measured minus computed image points (m, 2) in px; NaN behind the camera."""
     points = state.points[layout.points[layout.point]]
     return _residuals(layout, state, np.arange(len(layout.xy)), points)
 
 
-def lengths_at(layout: Layout, state: Start, rows: IntArray, points: FloatArray) -> FloatArray:
+def lengths_at(
+    layout: Layout, state: NetworkState, rows: IntArray, points: FloatArray
+) -> FloatArray:
     """Return the residuals' lengths (n,) in standard deviations, were points (n, 3) those of rows.
 
     They are `BEHIND` where a point is behind the camera.
@@ -189,13 +191,15 @@ def lengths_at(layout: Layout, state: Start, rows: IntArray, points: FloatArray)
     return np.nan_to_num(lengths, nan=BEHIND, posinf=BEHIND)
 
 
-def whitened_lengths(layout: Layout, state: Start) -> FloatArray:
+def whitened_lengths(layout: Layout, state: NetworkState) -> FloatArray:
     """Return the residuals' lengths (m,) in standard deviations, `BEHIND` behind the camera."""
     points = state.points[layout.points[layout.point]]
     return lengths_at(layout, state, np.arange(len(layout.xy)), points)
 
 
-def _residuals(layout: Layout, state: Start, rows: IntArray, points: FloatArray) -> FloatArray:
+def _residuals(
+    layout: Layout, state: NetworkState, rows: IntArray, points: FloatArray
+) -> FloatArray:
     photographs = layout.photographs[layout.photograph[rows]]
     computed = camera.project(
         state.calibrations[layout.camera[rows]],
@@ -227,7 +231,7 @@ class Design:
     misclosure: FloatArray
 
 
-def linearise(layout: Layout, state: Start) -> Design:
+def linearise(layout: Layout, state: NetworkState) -> Design:
     """Return the observation equations about approximate values."""
     photographs = layout.photographs[layout.photograph]
     linear = camera.linearise(
@@ -344,7 +348,9 @@ def solve(
     return poses, rest, changes[len(scale) :] / size
 
 
-def changed(layout: Layout, state: Start, poses: FloatArray, rest: FloatArray) -> Start:
+def changed(
+    layout: Layout, state: NetworkState, poses: FloatArray, rest: FloatArray
+) -> NetworkState:
     """Return approximate values with changes of poses (n, 6) and of the rest (u,) added."""
     calibrations, rotations = state.calibrations.copy(), state.rotations.copy()
     positions, points = state.positions.copy(), state.points.copy()

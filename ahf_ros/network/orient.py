@@ -24,7 +24,7 @@ from ahf_ros.network.planar import principal_axes
 from ahf_ros.network.progress import Watcher, watched
 from ahf_ros.network.resection import FEWEST_POINTS, at_one_place
 from ahf_ros.network.similarity import in_principal_axes
-from ahf_ros.network.solution import Solution, Start
+from ahf_ros.network.solution import NetworkState, Solution
 from ahf_ros.network.start import FEWEST_PHOTOGRAPHS, oriented, reversal, starts
 from ahf_ros.network.triples import FEWEST_COMMON, known_calibrations
 from ahf_ros.network.views import views_of
@@ -106,7 +106,7 @@ def orient(
     >>> names = tuple('123456'), tuple('ABCDEFGHIJKLMNOPQRST')
     >>> network = Network(names[0], np.zeros(6, int), cameras, names[1], seen)
     >>> (solution,) = orient(network)
-    >>> round(float(solution.start.calibrations[0, 0]), 2), solution.covariance_of_points.shape
+    >>> round(float(solution.state.calibrations[0, 0]), 2), solution.covariance_of_points.shape
     (1500.0, (60, 60))
     """
     with one_blas_thread(), watched(progress):
@@ -116,7 +116,9 @@ def orient(
         )
 
 
-def _oriented(network: Network, adjusted: Callable[[Network, Start], Solution]) -> list[Solution]:
+def _oriented(
+    network: Network, adjusted: Callable[[Network, NetworkState], Solution]
+) -> list[Solution]:
     """Return the solutions of a network in which a target is once in a photograph."""
     _check(network)
     refused: list[str] = []
@@ -132,7 +134,7 @@ def _oriented(network: Network, adjusted: Callable[[Network, Start], Solution]) 
             if (fisheye := with_fisheye_lenses(solution)) is not None:
                 other = adjusted(*fisheye)
                 solution = (
-                    other if other.start.used.sum() > solution.start.used.sum() else solution
+                    other if other.state.used.sum() > solution.state.used.sum() else solution
                 )
             reason = _doubtful(solution)
         if reason is None:
@@ -214,7 +216,7 @@ def _why_not(network: Network) -> str:
     )
 
 
-def _ambiguous(network: Network, start: Start) -> str | None:
+def _ambiguous(network: Network, start: NetworkState) -> str | None:
     """Return in words that the network's mirror image fits as well, None if it does not."""
     if reversal(network, start)[1] > 2.0:
         return None
@@ -227,7 +229,7 @@ def _ambiguous(network: Network, start: Start) -> str | None:
 
 def _doubtful(solution: Solution) -> str | None:
     """Return in words why an adjusted network is not believed, None if it is."""
-    network, start = solution.network, solution.start
+    network, start = solution.network, solution.state
     photographs = oriented(start)
     names = _names(network.photographs, photographs)
     if len(photographs) < FEWEST_PHOTOGRAPHS:
@@ -263,11 +265,11 @@ def _left_out(network: Network, solutions: Sequence[Solution]) -> tuple[str, ...
     posed = np.zeros(len(network.photographs), dtype=bool)
     placed = np.zeros(len(network.targets), dtype=bool)
     for solution in solutions:
-        posed[oriented(solution.start)] = True
-        placed |= np.isfinite(solution.start.points[:, 0])
+        posed[oriented(solution.state)] = True
+        placed |= np.isfinite(solution.state.points[:, 0])
     views = views_of(network)
     few, narrow, alike = [], [], []
-    start = solutions[0].start
+    start = solutions[0].state
     for index in np.flatnonzero(~posed).tolist():
         seen = np.isfinite(start.points[views[index].points, 0])
         if seen.sum() < FEWEST_POINTS:

@@ -16,7 +16,7 @@ from ahf_ros.network.datum import Datum
 from ahf_ros.network.knowledge import kind
 from ahf_ros.network.network import FloatArray, IntArray, Network
 from ahf_ros.network.similarity import Similarity, on_a_line, similarity_between
-from ahf_ros.network.solution import Start
+from ahf_ros.network.solution import NetworkState
 
 _MISFIT = 0.15  # of control points, relative to their extent, that no approximate value explains
 _STRETCH = 1.2  # ratio of lengths that none explains
@@ -25,7 +25,9 @@ _NARROW = 1e-3  # extent across a line of targets that hold no frame, relative t
 _UNITS = (10, 100, 1000, 25.4, 304.8)
 
 
-def placed(network: Network, start: Start, datum: Datum) -> tuple[Start, Datum, tuple[str, ...]]:
+def placed(
+    network: Network, start: NetworkState, datum: Datum
+) -> tuple[NetworkState, Datum, tuple[str, ...]]:
     """Return approximate values in the frame and scale of what is known, the datum, and warnings.
 
     The datum has names of three targets where it is `fixed`. Raises `ValueError` for bars or
@@ -62,14 +64,14 @@ def placed(network: Network, start: Start, datum: Datum) -> tuple[Start, Datum, 
     return start, datum, (*warnings, *of_bars)
 
 
-def _at(start: Start, index: dict[str, int], name: str) -> FloatArray:
+def _at(start: NetworkState, index: dict[str, int], name: str) -> FloatArray:
     """Return the coordinates (3,) of a target, NaN where it has none."""
     return start.points[index[name]] if name in index else np.full(3, np.nan)
 
 
 def _scaled(
-    network: Network, start: Start, index: dict[str, int], scaled: bool
-) -> tuple[Start, tuple[str, ...]]:
+    network: Network, start: NetworkState, index: dict[str, int], scaled: bool
+) -> tuple[NetworkState, tuple[str, ...]]:
     """Return values in the scale of bars, unless control gives it, and warnings of unseen bars.
 
     Bars that contradict each other, or the control points, raise `ValueError`.
@@ -188,7 +190,7 @@ def _deviations(movement: Similarity, here: FloatArray, known: FloatArray) -> Fl
     return deviations / extent if extent > 0 else np.full(len(here), np.inf)
 
 
-def _turned(start: Start, known: FloatArray, here: FloatArray) -> Start:
+def _turned(start: NetworkState, known: FloatArray, here: FloatArray) -> NetworkState:
     """Turn and, without bars, scale the network about the first of two points to the second."""
     old, new = here[1] - here[0], known[1] - known[0]
     middle = old / np.linalg.norm(old) + new / np.linalg.norm(new)
@@ -201,7 +203,7 @@ def _turned(start: Start, known: FloatArray, here: FloatArray) -> Start:
     return Similarity(rotation, shift, factor).in_frame(start)
 
 
-def _large_triangle(network: Network, start: Start) -> tuple[str, ...]:
+def _large_triangle(network: Network, start: NetworkState) -> tuple[str, ...]:
     """Return the names of three targets that span a large triangle."""
     points = start.points
     first = np.nanargmax(np.linalg.norm(points - np.nanmean(points, axis=0), axis=1))
@@ -211,7 +213,7 @@ def _large_triangle(network: Network, start: Start) -> tuple[str, ...]:
     return tuple(network.targets[place] for place in (first, second, third))
 
 
-def _check_datum(start: Start, index: dict[str, int], datum: Datum) -> None:
+def _check_datum(start: NetworkState, index: dict[str, int], datum: Datum) -> None:
     """Raise `ValueError` unless the named targets of a datum are seen and not on a line."""
     if not datum.targets:
         return
@@ -231,7 +233,7 @@ def _check_datum(start: Start, index: dict[str, int], datum: Datum) -> None:
         )
 
 
-def _axes(start: Start, points: FloatArray) -> Start:
+def _axes(start: NetworkState, points: FloatArray) -> NetworkState:
     """Return values whose frame has its origin, x axis and plane z = 0 at three points (3, 3)."""
     x = points[1] - points[0]
     z = np.cross(x, points[2] - points[0])

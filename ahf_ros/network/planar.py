@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 
 from ahf_ros.network.network import FloatArray
-from ahf_ros.network.solution import Start
+from ahf_ros.network.solution import NetworkState
 
 FLAT = 0.02
 """Points are a plane where their spread across it is less than this share of that along it."""
@@ -59,7 +59,7 @@ def planar_poses(points: FloatArray, xy: FloatArray) -> list[tuple[FloatArray, F
     return poses
 
 
-def mirrored(start: Start) -> Start:
+def mirrored(start: NetworkState) -> NetworkState:
     """Return the network that looks the same where perspective is weak (Necker's reversal).
 
     Points are mirrored at their mean plane. Each camera sees them under the same first two axes,

@@ -24,7 +24,7 @@ from ahf_ros.network.normals import BEHIND, robust_spread
 from ahf_ros.network.planar import mirrored
 from ahf_ros.network.points import entries
 from ahf_ros.network.resection import Resection, resections
-from ahf_ros.network.solution import Start
+from ahf_ros.network.solution import NetworkState
 from ahf_ros.network.testing import CRITICAL
 
 ROUNDS = 20
@@ -187,7 +187,7 @@ def other_fit(sight: Sight, fit: Fit, unlikely: float) -> Fit | None:
     """
     rows = np.flatnonzero(fit.used)
     part = sight.chosen(rows)
-    state = Start(
+    state = NetworkState(
         calibrations=pinhole(1.0, 1, 1)[None],
         rotations=fit.rotation[None],
         positions=fit.position[None],

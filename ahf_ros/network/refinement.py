@@ -17,7 +17,7 @@ from ahf_ros.network.datum import movements
 from ahf_ros.network.least_squares import Conditions, Knowledge, minimise
 from ahf_ros.network.network import Network
 from ahf_ros.network.normals import Layout
-from ahf_ros.network.solution import Start
+from ahf_ros.network.solution import NetworkState
 
 _AGREES = 5.0  # standard deviations, or robust ones, of an observation that agrees
 NEEDED = (
@@ -28,11 +28,11 @@ NEEDED = (
 
 def refine(
     network: Network,
-    start: Start,
+    start: NetworkState,
     free: tuple[str, ...] = (),
     *,
     rounds: int = 30,
-) -> Start:
+) -> NetworkState:
     """Return approximate values bettered by a robust adjustment of the used observations.
 
     Bars and control points are not used, and the frame stays about where it was. The parameters
@@ -61,7 +61,7 @@ def free_parameters(network: Network, names: tuple[str, ...]) -> NDArray[np.bool
     return mask & np.array(exists) & ~fixed[:, None]
 
 
-def agreeing(network: Network, state: Start, adjusted: Layout) -> NDArray[np.bool_]:
+def agreeing(network: Network, state: NetworkState, adjusted: Layout) -> NDArray[np.bool_]:
     """Return which observations (m,), adjusted or not, agree with the values."""
     everything = np.ones(len(network.observations.xy), dtype=bool)
     every = normals.lay_out(network, state, everything, adjusted.free, backward=adjusted.backward)
@@ -80,7 +80,7 @@ def usual_lens(network: Network, layout: Layout) -> Knowledge:
     """
     columns, middles, sigmas = usual(network, layout)
 
-    def conditions(state: Start) -> Conditions:
+    def conditions(state: NetworkState) -> Conditions:
         rows = np.zeros((7 + len(columns), layout.unknowns))
         rows[:7, : 3 * len(layout.points)] = movements(state.points[layout.points]).T
         rows[7 + np.arange(len(columns)), columns] = 1

@@ -23,7 +23,7 @@ from ahf_ros.network.network import FloatArray, Network, Rejection
 from ahf_ros.network.normals import Layout
 from ahf_ros.network.precision import Precision, of_computed, precision
 from ahf_ros.network.progress import stage
-from ahf_ros.network.solution import Start
+from ahf_ros.network.solution import NetworkState
 from ahf_ros.network.testing import (
     CRITICAL,
     SIGNIFICANCE,
@@ -46,7 +46,7 @@ _SUSPECT = (
     0.25  # share of a target's rays that disagree, from which on a second place is looked for
 )
 Mask = NDArray[np.bool_]
-LayOut = Callable[[Start], Layout]
+LayOut = Callable[[NetworkState], Layout]
 """Lays out the used observations of a state."""
 
 
@@ -57,7 +57,9 @@ class Place(NamedTuple):
     rows: NDArray[np.int64]
 
 
-def places(layout: Layout, state: Start, rows: NDArray[np.int64], tolerance: float) -> list[Place]:
+def places(
+    layout: Layout, state: NetworkState, rows: NDArray[np.int64], tolerance: float
+) -> list[Place]:
     """Return where the rays of rows of a layout meet within a tolerance in standard deviations.
 
     Two rays or more make a place; each ray is used once.
@@ -73,7 +75,7 @@ def places(layout: Layout, state: Start, rows: NDArray[np.int64], tolerance: flo
 
 
 def _largest(
-    layout: Layout, state: Start, rows: NDArray[np.int64], tolerance: float
+    layout: Layout, state: NetworkState, rows: NDArray[np.int64], tolerance: float
 ) -> Place | None:
     """Return the place where most rays meet, by trying all pairs of them, or many."""
     pairs = np.array(list(combinations(range(len(rows)), 2)))
@@ -98,7 +100,9 @@ def _largest(
     return Place(point, rows[chosen]) if chosen.sum() > 1 else None
 
 
-def _rays(layout: Layout, state: Start, rows: NDArray[np.int64]) -> tuple[FloatArray, FloatArray]:
+def _rays(
+    layout: Layout, state: NetworkState, rows: NDArray[np.int64]
+) -> tuple[FloatArray, FloatArray]:
     """Return the centres (n, 3) and directions (n, 3) of the rays of rows of a layout."""
     photographs = layout.photographs[layout.photograph[rows]]
     calibrations = state.calibrations[layout.camera[rows]]
@@ -125,7 +129,7 @@ class Adjusted:
     """
 
     layout: Layout
-    state: Start
+    state: NetworkState
     knowledge: Knowledge
     precision: Precision
     every: Layout
@@ -150,7 +154,7 @@ class Adjusted:
 
 
 def adjusted(
-    network: Network, state: Start, lay_out: LayOut, known: Callable[[Layout], Knowledge]
+    network: Network, state: NetworkState, lay_out: LayOut, known: Callable[[Layout], Knowledge]
 ) -> Adjusted:
     """Return the least-squares adjustment of the used observations, with tests of all."""
     layout = lay_out(state)
@@ -168,7 +172,7 @@ def adjusted(
 
 
 def tested(
-    network: Network, state: Start, lay_out: LayOut, known: Callable[[Layout], Knowledge]
+    network: Network, state: NetworkState, lay_out: LayOut, known: Callable[[Layout], Knowledge]
 ) -> tuple[Adjusted, float]:
     """Return the adjustment after Baarda's tests, and the residual from which on one fails them.
 
@@ -196,7 +200,9 @@ def tested(
     return result, critical
 
 
-def relocated(network: Network, state: Start, layout: Layout, tolerance: float) -> Start:
+def relocated(
+    network: Network, state: NetworkState, layout: Layout, tolerance: float
+) -> NetworkState:
     """Return values in which each suspect target is where most of its rays meet.
 
     Suspect is a target of which a quarter of the rays disagrees: it may lie between two places, or
@@ -265,7 +271,7 @@ def rejections(
     return tuple(rejected), tuple(warnings)
 
 
-def _by_chance(every: Layout, state: Start, place: Place, rows: NDArray[np.int64]) -> float:
+def _by_chance(every: Layout, state: NetworkState, place: Place, rows: NDArray[np.int64]) -> float:
     """Return how often some of a target's wrong rays meet so well at one place by chance.
 
     A shift of the target explains three of the coordinates of their residuals, and more than three
@@ -283,7 +289,7 @@ def _by_chance(every: Layout, state: Start, place: Place, rows: NDArray[np.int64
     return choices * float(special().fdtrc(3, free, max(ratio, 0.0)))
 
 
-def _other_target(every: Layout, state: Start, row: int, tolerance: float) -> int | None:
+def _other_target(every: Layout, state: NetworkState, row: int, tolerance: float) -> int | None:
     """Return the index of another target whose image is where a row was measured, if any."""
     points = state.points[every.points]
     rows = np.full(len(points), row)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ahf_ros.network.network import FloatArray
-from ahf_ros.network.solution import Start
+from ahf_ros.network.solution import NetworkState
 
 FLAT = 1e-5
 """Extent across a line, relative to that along it, of points that are on the line."""
@@ -32,7 +32,7 @@ class Similarity:
         turned = np.einsum('ai,minj,bj->manb', self.rotation, blocks, self.rotation, optimize=True)
         return self.scale**2 * turned.reshape(covariance.shape)
 
-    def in_frame(self, start: Start) -> Start:
+    def in_frame(self, start: NetworkState) -> NetworkState:
         """Return the values of a network after the movement."""
         return replace(
             start,
@@ -61,7 +61,7 @@ def on_a_line(xyz: FloatArray, flat: float = FLAT) -> bool:
     return len(xyz) < 3 or bool(values[1] <= flat * values[0])
 
 
-def in_principal_axes(start: Start) -> Start:
+def in_principal_axes(start: NetworkState) -> NetworkState:
     """Return values in the frame of the points' centroid and principal axes, the longest first.
 
     The cameras are above the plane z = 0, and the target furthest along x has a positive x.

@@ -8,11 +8,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ahf_ros.base.deprecation import warn_of_name
 from ahf_ros.network.network import FloatArray, Network, Rejection, part_of
 from ahf_ros.network.points import MeasuredPoints, blocks, entries
 
@@ -20,8 +21,8 @@ Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
-class Start:
-    """Approximate values of a connected group of photographs, in any frame and scale.
+class NetworkState:
+    """Values of a connected group of photographs, in any frame and scale, approximate or adjusted.
 
     Photographs and points that are not in the group are NaN.
     """
@@ -57,14 +58,14 @@ class Suspect:
 
 @dataclass(frozen=True)
 class Solution:
-    """An adjusted network; arrays as in `Start`, NaN for what could not be determined.
+    """An adjusted network; arrays as in `NetworkState`, NaN for what could not be determined.
 
     Covariances hold the a-priori weights, scaled by the square of `sigma0` where `scaled` says so.
     A pose's 6x6 covariance is of (position, rotation vector in the camera's frame, rad).
     """
 
     network: Network
-    start: Start
+    state: NetworkState
     residuals: FloatArray
     """(observations, 2) measured minus computed, px."""
     normalised: FloatArray
@@ -99,19 +100,25 @@ class Solution:
             )
 
     @property
+    def start(self) -> NetworkState:
+        """Former name of `state`."""
+        warn_of_name('Solution', 'start', 'state')
+        return self.state
+
+    @property
     def oriented(self) -> NDArray[np.bool_]:
         """Which photographs have a pose, (photographs,)."""
-        return np.asarray(np.isfinite(self.start.positions).all(axis=1))
+        return np.asarray(np.isfinite(self.state.positions).all(axis=1))
 
     @property
     def determined(self) -> NDArray[np.bool_]:
         """Which targets have coordinates, (points,)."""
-        return np.asarray(np.isfinite(self.start.points).all(axis=1))
+        return np.asarray(np.isfinite(self.state.points).all(axis=1))
 
     @property
     def calibrated(self) -> NDArray[np.bool_]:
         """Which cameras have a calibration, (cameras,): those that took oriented photographs."""
-        return np.asarray(np.isfinite(self.start.calibrations).all(axis=1))
+        return np.asarray(np.isfinite(self.state.calibrations).all(axis=1))
 
     @property
     def point_covariances(self) -> FloatArray:
@@ -125,7 +132,7 @@ class Solution:
         some = entries(rows)
         return MeasuredPoints(
             names=tuple(self.network.targets[row] for row in rows),
-            xyz=self.start.points[rows],
+            xyz=self.state.points[rows],
             covariance=self.covariance_of_points[np.ix_(some, some)],
             sigma0=float(self.sigma0),
             redundancy=int(self.redundancy),
@@ -153,7 +160,7 @@ def separated(solutions: Sequence[Solution]) -> list[Solution]:
 
 def part(solution: Solution, photographs: Mask, targets: Mask) -> Solution:
     """Return a solution with some of its photographs and targets; cameras stay as they are."""
-    start = solution.start
+    start = solution.state
     network, rows = part_of(solution.network, np.flatnonzero(photographs), np.flatnonzero(targets))
     if not network.bars and not network.control:
         network = replace(network, unit='')
@@ -161,7 +168,7 @@ def part(solution: Solution, photographs: Mask, targets: Mask) -> Solution:
     return replace(
         solution,
         network=network,
-        start=replace(
+        state=replace(
             start,
             rotations=start.rotations[photographs],
             positions=start.positions[photographs],
@@ -174,3 +181,11 @@ def part(solution: Solution, photographs: Mask, targets: Mask) -> Solution:
         covariance_of_points=solution.covariance_of_points[np.ix_(entries, entries)],
         rejected=tuple(it for it in solution.rejected if it.photograph in network.photographs),
     )
+
+
+def __getattr__(name: str) -> Any:
+    """Return what had another name until the last release."""
+    if name != 'Start':
+        raise AttributeError(f'module {__name__!r} has no attribute {name!r}')
+    warn_of_name(__name__, name, 'NetworkState')
+    return NetworkState

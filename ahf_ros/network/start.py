@@ -19,7 +19,7 @@ from ahf_ros.network.planar import mirrored
 from ahf_ros.network.progress import stage
 from ahf_ros.network.refinement import refine
 from ahf_ros.network.resection import ALIKE, BOUND, FEWEST_POINTS, Resection, resections
-from ahf_ros.network.solution import Start
+from ahf_ros.network.solution import NetworkState
 from ahf_ros.network.triangulation import intersect
 from ahf_ros.network.triples import (
     WEAK,
@@ -53,7 +53,7 @@ ONE_MINIMUM = np.radians(0.5)
 """Networks most of whose photographs are turned against each other by less are the same."""
 
 
-def starts(network: Network) -> list[tuple[Network, Start]]:
+def starts(network: Network) -> list[tuple[Network, NetworkState]]:
     """Return approximate values of each connected group of photographs, the largest first.
 
     Photographs of another zoom have cameras of their own in its network. Groups without
@@ -62,7 +62,7 @@ def starts(network: Network) -> list[tuple[Network, Start]]:
     """
     views = views_of(network)
     remaining = [index for index, view in enumerate(views) if len(view.points) >= FEWEST_POINTS]
-    found: list[tuple[Network, Start]] = []
+    found: list[tuple[Network, NetworkState]] = []
     while len(remaining) >= FEWEST_PHOTOGRAPHS:
         stage('start values', f'a beginning among {len(remaining)} photographs')
         largest = _largest(network, views, remaining)
@@ -75,12 +75,12 @@ def starts(network: Network) -> list[tuple[Network, Start]]:
     return found
 
 
-def oriented(start: Start) -> IntArray:
+def oriented(start: NetworkState) -> IntArray:
     """Return the indices of photographs that have a pose."""
     return np.flatnonzero(np.isfinite(start.positions[:, 0]))
 
 
-def reversal(network: Network, start: Start) -> tuple[Start, float]:
+def reversal(network: Network, start: NetworkState) -> tuple[NetworkState, float]:
     """Return the mirror image of a network, adjusted, and its chi-square less that of the network.
 
     Infinite where the mirror image does not exist, or is the network itself.
@@ -105,15 +105,15 @@ def reversal(network: Network, start: Start) -> tuple[Start, float]:
 
 def _largest(
     network: Network, views: Sequence[View], among: Sequence[int]
-) -> tuple[Network, Start] | None:
+) -> tuple[Network, NetworkState] | None:
     """Return what grows largest of the best seeds, of several equally large ones the best.
 
     Where a second seed agrees about as many photographs, or one with zooms, others are not tried.
     """
     best: tuple[float, float] | None = None
-    result: tuple[Network, Start] | None = None
+    result: tuple[Network, NetworkState] | None = None
     for seed in islice(seeds(network, views, among), MOST_SEEDS):
-        grown = _with_zooms(network, views, seed.start, among)
+        grown = _with_zooms(network, views, seed.state, among)
         if grown is None or len(oriented(grown[1])) < FEWEST_PHOTOGRAPHS:
             continue
         lengths, start = lengths_of(*grown), grown[1]
@@ -131,8 +131,8 @@ def _largest(
 
 
 def _with_zooms(
-    network: Network, views: Sequence[View], start: Start, among: Sequence[int]
-) -> tuple[Network, Start] | None:
+    network: Network, views: Sequence[View], start: NetworkState, among: Sequence[int]
+) -> tuple[Network, NetworkState] | None:
     """Return what a seed reaches, in a network whose other zooms have cameras of their own."""
     grown = _grown(network, views, start, among)
     for _ in range(MOST_DIVISIONS):
@@ -145,8 +145,8 @@ def _with_zooms(
 
 
 def _grown(
-    network: Network, views: Sequence[View], start: Start, among: Sequence[int]
-) -> Start | None:
+    network: Network, views: Sequence[View], start: NetworkState, among: Sequence[int]
+) -> NetworkState | None:
     """Return the values of all photographs and points that a seed reaches."""
     postponed: dict[int, int] = {}
     fewest = GROWING
@@ -180,7 +180,9 @@ def _grown(
         return None
 
 
-def _pruned(views: Sequence[View], start: Start, postponed: dict[int, int], fewest: int) -> Start:
+def _pruned(
+    views: Sequence[View], start: NetworkState, postponed: dict[int, int], fewest: int
+) -> NetworkState:
     """Return the values without photographs most of whose points do not agree."""
     rotations, positions, used = start.rotations.copy(), start.positions.copy(), start.used.copy()
     for photograph in oriented(start):
@@ -193,14 +195,14 @@ def _pruned(views: Sequence[View], start: Start, postponed: dict[int, int], fewe
     return replace(start, rotations=rotations, positions=positions, used=used)
 
 
-def _known(view: View, start: Start) -> int:
+def _known(view: View, start: NetworkState) -> int:
     """Return how many points of a photograph have coordinates."""
     return int(np.isfinite(start.points[view.points, 0]).sum())
 
 
 def _next(
     views: Sequence[View],
-    start: Start,
+    start: NetworkState,
     among: Sequence[int],
     postponed: dict[int, int],
     fewest: int,
@@ -224,7 +226,7 @@ def _next(
 
 
 def _pose(
-    network: Network, view: View, start: Start, spread: float, fewest: int
+    network: Network, view: View, start: NetworkState, spread: float, fewest: int
 ) -> tuple[Resection | None, FloatArray]:
     """Return the pose of a photograph and its calibration; None while it is not certain.
 
@@ -245,8 +247,8 @@ def _pose(
 
 
 def _with_pose(
-    start: Start, view: View, photograph: int, pose: Resection, calibration: FloatArray
-) -> Start:
+    start: NetworkState, view: View, photograph: int, pose: Resection, calibration: FloatArray
+) -> NetworkState:
     """Return the values with one photograph more."""
     rotations, positions = start.rotations.copy(), start.positions.copy()
     calibrations, used = start.calibrations.copy(), start.used.copy()
@@ -259,7 +261,7 @@ def _with_pose(
     )
 
 
-def _intersected(network: Network, views: Sequence[View], start: Start) -> Start:
+def _intersected(network: Network, views: Sequence[View], start: NetworkState) -> NetworkState:
     """Return the values with every point that enough rays determine.
 
     Points on which their rays agree stay; others are intersected anew, and dropped if that fails.
@@ -294,7 +296,7 @@ def _intersected(network: Network, views: Sequence[View], start: Start) -> Start
     return replace(start, points=points, used=used)
 
 
-def _adjusted(network: Network, start: Start, rounds: int = 8) -> Start:
+def _adjusted(network: Network, start: NetworkState, rounds: int = 8) -> NetworkState:
     """Return the values after a robust adjustment of what the photographs determine so far.
 
     Focal lengths that nobody gave are free; others, and the lens, when they become certain and

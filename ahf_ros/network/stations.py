@@ -142,7 +142,7 @@ def _of_image(table: Mapping[str, _Value], name: str) -> _Value | None:
 
 def _pose(solution: Solution, index: int) -> Transform:
     """Return the pose of a camera among the targets."""
-    values = solution.start
+    values = solution.state
     return camera_pose(
         values.rotations[index], values.positions[index], solution.pose_covariances[index]
     )

@@ -31,7 +31,7 @@ _WEAK = 3.0  # times the median, of the largest standard deviation of a target
 
 def rays_of(solution: Solution) -> IntArray:
     """Return the number of observations of each target that the adjustment used."""
-    used = solution.network.observations.point[solution.start.used]
+    used = solution.network.observations.point[solution.state.used]
     return np.bincount(used, minlength=len(solution.network.targets)).astype(np.int64)
 
 
@@ -64,7 +64,7 @@ def weaknesses(solution: Solution) -> list[Weakness]:
 def _of_targets(solution: Solution) -> Iterator[Weakness]:
     network = solution.network
     known = solution.determined
-    angles = largest_angles(network, solution.start)
+    angles = largest_angles(network, solution.state)
     rays, largest = rays_of(solution), semi_axes(solution)[:, 0]
     found = known & ~(largest == 0)  # the others were given, and need no rays
 
@@ -100,7 +100,7 @@ def _of_targets(solution: Solution) -> Iterator[Weakness]:
 
 
 def _of_photographs(solution: Solution) -> Iterator[Weakness]:
-    network, values = solution.network, solution.start
+    network, values = solution.network, solution.state
     posed = solution.oriented
     number = np.bincount(
         network.observations.photograph[values.used], minlength=len(network.photographs)
@@ -121,7 +121,7 @@ def _of_photographs(solution: Solution) -> Iterator[Weakness]:
 
 def _of_cameras(solution: Solution) -> Iterator[Weakness]:
     """Yield what would determine the calibrations better."""
-    network, values = solution.network, solution.start
+    network, values = solution.network, solution.state
     flat, empty, least = list[str](), list[str](), 1.0
     for place, view in enumerate(network.cameras):
         taken = (network.camera_of == place) & solution.oriented

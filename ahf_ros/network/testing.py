@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from ahf_ros.base.extras import need
 from ahf_ros.network.network import FloatArray
 from ahf_ros.network.normals import BEHIND, Design, Layout, whitened_lengths
-from ahf_ros.network.solution import Start
+from ahf_ros.network.solution import NetworkState
 
 CRITICAL = 4.7
 """Normalised residual above which an observation is left out, as commercial programs have it."""
@@ -117,7 +117,11 @@ def tails(lengths: FloatArray) -> Tails:
 
 
 def normalised(
-    layout: Layout, state: Start, design: Design, computed: FloatArray, used: NDArray[np.bool_]
+    layout: Layout,
+    state: NetworkState,
+    design: Design,
+    computed: FloatArray,
+    used: NDArray[np.bool_],
 ) -> FloatArray:
     """Return residuals (m,) over their standard deviations, of observations used (m,) or not.
 

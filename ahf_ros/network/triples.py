@@ -21,7 +21,7 @@ from ahf_ros.network.precision import precision
 from ahf_ros.network.refinement import free_parameters, refine, usual_lens
 from ahf_ros.network.relative import relative_orientations
 from ahf_ros.network.resection import resections
-from ahf_ros.network.solution import Start
+from ahf_ros.network.solution import NetworkState
 from ahf_ros.network.triangulation import SMALLEST_ANGLE, directions, midpoints
 from ahf_ros.network.views import View, largest_angles, lengths_of, spread_of
 
@@ -67,7 +67,7 @@ class Seed:
     """
 
     photographs: tuple[int, ...]
-    start: Start
+    state: NetworkState
     spread: float
     cost: float
     angle: float
@@ -76,7 +76,7 @@ class Seed:
     @property
     def rank(self) -> float:
         """The smaller the better: uncertain points and an uncertain focal length."""
-        number = int(np.isfinite(self.start.points[:, 0]).sum())
+        number = int(np.isfinite(self.state.points[:, 0]).sum())
         precision = self.spread / (min(self.angle, 0.8) * np.sqrt(number))
         return float(precision * (1 + (self.focal_sigma / 0.02) ** 2))
 
@@ -176,7 +176,7 @@ def _worth(first: View, second: View) -> float:
 @dataclass(frozen=True)
 class _Hypothesis:
     score: float
-    start: Start
+    state: NetworkState
 
 
 def _seeds_of(
@@ -193,13 +193,13 @@ def _seeds_of(
         hypotheses = sorted(_hypotheses(part, own, known), key=lambda one: one.score)[:4]
     found: list[Seed] = []
     for hypothesis in hypotheses:
-        seed = _refined(part, hypothesis.start, triple, unknown)
+        seed = _refined(part, hypothesis.state, triple, unknown)
         if seed is None:
             continue
         found.append(seed)
     if found:
         best = min(found, key=lambda one: one.cost)
-        seed = _refined(part, mirrored(best.start), triple, unknown)
+        seed = _refined(part, mirrored(best.state), triple, unknown)
         found += [seed] if seed is not None else []
     return [_whole(network, seed, rows) for seed in _different(found)]
 
@@ -217,8 +217,8 @@ def _different(found: list[Seed]) -> list[Seed]:
 
 def _same(seed: Seed, other: Seed) -> bool:
     """Return whether two seeds have the same relative rotations, to half a degree."""
-    turns = seed.start.rotations[1:] @ seed.start.rotations[0].T
-    others = other.start.rotations[1:] @ other.start.rotations[0].T
+    turns = seed.state.rotations[1:] @ seed.state.rotations[0].T
+    others = other.state.rotations[1:] @ other.state.rotations[0].T
     cosines = (np.einsum('kij,kij->k', turns, others) - 1) / 2
     return bool(np.all(cosines > np.cos(np.radians(0.5))))
 
@@ -261,7 +261,7 @@ def _hypotheses(
         seen = np.isfinite(points[third.points, 0])
         poses = resections(points[third.points[seen]], xy[2][seen], sigma[2][seen])
         for pose in poses[:2]:
-            start = Start(
+            start = NetworkState(
                 calibrations,
                 np.stack([np.eye(3), pair.rotation, pose.rotation]),
                 np.stack([np.zeros(3), pair.position, pose.position]),
@@ -273,7 +273,7 @@ def _hypotheses(
 
 def _refined(
     part: Network,
-    start: Start,
+    start: NetworkState,
     triple: tuple[int, int, int],
     unknown: list[int],
 ) -> Seed | None:
@@ -310,7 +310,7 @@ def _refined(
     return Seed(triple, start, spread, cost, angle, sigma)
 
 
-def _first(part: Network, held: Network, start: Start) -> Iterator[Start]:
+def _first(part: Network, held: Network, start: NetworkState) -> Iterator[NetworkState]:
     """Yield values without the lens, and with it where they leave residuals unexplained.
 
     What is fitted without the lens may be far from where the lens explains them.
@@ -322,14 +322,16 @@ def _first(part: Network, held: Network, start: Start) -> Iterator[Start]:
         yield refine(part, replace(start, used=known), LENS[0], rounds=15)
 
 
-def _unexplained(network: Network, start: Start) -> bool:
+def _unexplained(network: Network, start: NetworkState) -> bool:
     """Return whether a lens may explain what is left of residuals."""
     lengths = lengths_of(network, start)
     agree = np.mean(start.used[~np.isnan(lengths)])
     return bool(spread_of(lengths) >= UNEXPLAINED or agree <= MOST_AGREE)
 
 
-def with_lens(network: Network, start: Start, rounds: int) -> tuple[Start, tuple[str, ...]]:
+def with_lens(
+    network: Network, start: NetworkState, rounds: int
+) -> tuple[NetworkState, tuple[str, ...]]:
     """Return the values with as much of the lenses as residuals ask for, and what was released.
 
     A lens that is not known makes residuals of many standard deviations, which would cost good
@@ -360,7 +362,7 @@ def _misfit(lengths: FloatArray) -> float:
     return float(np.sum(np.log1p((np.minimum(known, BEHIND) / BOUND) ** 2)))
 
 
-def focal_sigma(network: Network, start: Start, free: tuple[str, ...]) -> float:
+def focal_sigma(network: Network, start: NetworkState, free: tuple[str, ...]) -> float:
     """Return the largest relative standard deviation of a free focal length, for unit weights."""
     mask = free_parameters(network, free)
     layout = normals.lay_out(network, start, start.used, mask)
@@ -383,9 +385,9 @@ def _whole(network: Network, seed: Seed, rows: IntArray) -> Seed:
     count = len(network.photographs)
     rotations, positions = np.full((count, 3, 3), np.nan), np.full((count, 3), np.nan)
     used = np.zeros(len(network.observations.xy), dtype=bool)
-    rotations[list(seed.photographs)] = seed.start.rotations
-    positions[list(seed.photographs)] = seed.start.positions
-    used[rows] = seed.start.used
+    rotations[list(seed.photographs)] = seed.state.rotations
+    positions[list(seed.photographs)] = seed.state.positions
+    used[rows] = seed.state.used
     return replace(
-        seed, start=replace(seed.start, rotations=rotations, positions=positions, used=used)
+        seed, state=replace(seed.state, rotations=rotations, positions=positions, used=used)
     )

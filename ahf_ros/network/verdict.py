@@ -110,7 +110,7 @@ def relative_precision(solution: Solution) -> float:
 
 def largest_dimension(solution: Solution) -> float:
     """Return the largest distance between two targets, 0 without any."""
-    points = solution.start.points[solution.determined]
+    points = solution.state.points[solution.determined]
     return max((float(np.linalg.norm(points - it, axis=1).max()) for it in points), default=0.0)
 
 
@@ -123,7 +123,7 @@ def coordinate_deviation(solution: Solution) -> float:
 def undetermined_parameters(solution: Solution, camera: int) -> list[str]:
     """Return parameters of a camera that photographs hardly determine: as usual of lenses."""
     sigmas = standard_deviations(solution.camera_covariances[camera])
-    focal = solution.start.calibrations[camera, 0]
+    focal = solution.state.calibrations[camera, 0]
     usual = usual_deviations(solution.network.cameras[camera], focal).items()
     return [
         name

@@ -10,7 +10,7 @@ from ahf_ros.network import normals
 from ahf_ros.network.camera import undistort
 from ahf_ros.network.network import FloatArray, IntArray, Network
 from ahf_ros.network.refinement import free_parameters
-from ahf_ros.network.solution import Start
+from ahf_ros.network.solution import NetworkState
 from ahf_ros.network.triangulation import largest_angle
 
 NOWHERE = 1e3
@@ -56,7 +56,7 @@ def views_of(network: Network) -> list[View]:
     return made
 
 
-def lengths_of(network: Network, start: Start) -> FloatArray:
+def lengths_of(network: Network, start: NetworkState) -> FloatArray:
     """Return residuals (m,) in standard deviations, NaN where pose or point are not known.
 
     Points behind a camera that has a pose have infinite ones.
@@ -79,7 +79,7 @@ def spread_of(lengths: FloatArray) -> float:
     return max(1.0, normals.robust_spread(known)) if len(known) else np.inf
 
 
-def largest_angles(network: Network, start: Start) -> FloatArray:
+def largest_angles(network: Network, start: NetworkState) -> FloatArray:
     """Return the largest angle between two used rays of each target, rad; NaN below two rays."""
     angles = np.full(len(network.targets), np.nan)
     observed = network.observations

@@ -17,7 +17,7 @@ from ahf_ros.network.camera import pinhole
 from ahf_ros.network.network import FloatArray, IntArray, Network
 from ahf_ros.network.refinement import refine
 from ahf_ros.network.resection import FEWEST_POINTS, Resection, resections
-from ahf_ros.network.solution import Solution, Start
+from ahf_ros.network.solution import NetworkState, Solution
 from ahf_ros.network.triples import LENS, STEPS, focal_steps
 from ahf_ros.network.views import View, lengths_of, spread_of
 
@@ -32,8 +32,8 @@ _SAME = 4.0  # standard deviations between focal lengths that may be one
 
 
 def with_own_zooms(
-    network: Network, views: Sequence[View], start: Start, among: Sequence[int]
-) -> tuple[Network, Start] | None:
+    network: Network, views: Sequence[View], start: NetworkState, among: Sequence[int]
+) -> tuple[Network, NetworkState] | None:
     """Return a network in which photographs of another zoom have a camera each, and its values.
 
     Those are tested of which a fifth disagrees, or all where residuals are large throughout, and
@@ -72,8 +72,8 @@ def with_own_zooms(
 
 
 def _divided(
-    network: Network, start: Start, own: IntArray, lenses: FloatArray
-) -> tuple[Network, Start]:
+    network: Network, start: NetworkState, own: IntArray, lenses: FloatArray
+) -> tuple[Network, NetworkState]:
     """Return a network in which some photographs have a camera each, with these calibrations."""
     camera_of, usual = network.camera_of.copy(), network.camera_of[own]
     camera_of[own] = len(network.cameras) + np.arange(len(own))
@@ -95,12 +95,12 @@ def _divided(
     )
 
 
-def with_common_zooms(network: Network, solution: Solution) -> tuple[Network, Start]:
+def with_common_zooms(network: Network, solution: Solution) -> tuple[Network, NetworkState]:
     """Return a divided network whose cameras of one focal length are one again, and its values.
 
     `network` is the one that was not divided.
     """
-    divided, start = solution.network, solution.start
+    divided, start = solution.network, solution.state
     sigma = np.sqrt([covariance[0, 0] for covariance in solution.camera_covariances])
     one_of = np.arange(len(divided.cameras))
     for camera in range(len(network.cameras)):
@@ -133,7 +133,7 @@ def of_other_zooms(network: Network, solution: Solution) -> tuple[str, ...]:
         mine = solution.oriented & (network.camera_of == camera)
         other = np.flatnonzero(mine & (np.array(names) != np.array(usual)))
         if len(other):
-            lengths = solution.start.calibrations[own.camera_of[mine], 0]
+            lengths = solution.state.calibrations[own.camera_of[mine], 0]
             cameras = counted(len(set(own.camera_of[other].tolist())), 'camera')
             warnings.append(
                 f'camera {view.name}: {len(other)} of {mine.sum()} photographs, such as '
@@ -146,7 +146,7 @@ def of_other_zooms(network: Network, solution: Solution) -> tuple[str, ...]:
 
 
 def with_own_focal(
-    network: Network, view: View, start: Start, spread: float
+    network: Network, view: View, start: NetworkState, spread: float
 ) -> tuple[list[Resection], FloatArray]:
     """Return the poses of a photograph of an unknown zoom, and the calibration that fits best."""
     camera, seen = network.cameras[view.camera], np.isfinite(start.points[view.points, 0])
@@ -174,7 +174,7 @@ def with_own_focal(
     return fit(best)
 
 
-def _is_zoomed(network: Network, view: View, start: Start) -> bool:
+def _is_zoomed(network: Network, view: View, start: NetworkState) -> bool:
     """Return whether only another focal length than that of its camera fits a photograph."""
     seen = np.isfinite(start.points[view.points, 0])
     if not np.isfinite(start.calibrations[view.camera, 0]) or seen.sum() <= FEWEST_POINTS:
@@ -191,7 +191,7 @@ def zooms_of_groups(network: Network, solutions: Sequence[Solution]) -> tuple[st
     warnings = []
     for view in network.cameras:
         lengths = [
-            float(solution.start.calibrations[camera, 0])
+            float(solution.state.calibrations[camera, 0])
             for solution in solutions
             for camera in np.unique(solution.network.camera_of[solution.oriented])
             if solution.network.cameras[camera].name == view.name

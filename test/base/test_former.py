@@ -11,6 +11,7 @@ import pytest
 
 from ahf_ros.base.former import FORMER, present_place
 from support.command_line import python
+from support.networks import solution
 
 
 @pytest.mark.parametrize('former', FORMER)
@@ -53,3 +54,13 @@ def test_what_never_was_is_not_there() -> None:
 def test_nothing_is_loaded_for_former_names_before_they_are_used() -> None:
     program = "import sys, ahf_ros; assert 'ahf_ros.base.target' not in sys.modules"
     assert python('-c', program).returncode == 0
+
+
+def test_former_names_of_a_solution_lead_to_the_present_ones_and_warn() -> None:
+    made = solution()
+    with pytest.warns(DeprecationWarning, match='Solution calls start state now') as it:
+        assert made.start is made.state
+    with pytest.warns(DeprecationWarning, match='calls Start NetworkState now') as also:
+        from ahf_ros.network.solution import Start
+    assert Start is type(made.state)
+    assert {warning.filename for warning in (*it, *also)} == {__file__}

@@ -40,7 +40,7 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / 'results.jsonl').write_text('\n'.join(lines))
     camera = ros_yaml(CameraView('camera', *SIZE), CALIBRATION, np.zeros((10, 10)))
     (folder / 'camera.yaml').write_bytes(camera)
-    points = TRUE.start.points
+    points = TRUE.state.points
     with (folder / 'bars.csv').open('w', newline='') as file:
         rows = [('id_1', 'id_2', 'length', 'sigma', 'role')]
         for first, second, role in ((0, 1, 'control'), (2, 3, 'check')):
@@ -69,7 +69,7 @@ def test_coordinates_come_from_results_alone(
     found = read_network(folder)
     assert found.points.names == TRUE.network.targets and len(found.photographs) == 8
     assert found.points.unit == 'mm'
-    error = distances(found.points.xyz) - distances(TRUE.start.points)
+    error = distances(found.points.xyz) - distances(TRUE.state.points)
     assert np.abs(error).max() < 0.2
     np.testing.assert_allclose(found.calibrations[0], CALIBRATION, rtol=1e-6, atol=3e-5)
     told = capsys.readouterr()
@@ -101,7 +101,7 @@ def test_control_points_give_their_frame(results: Path, tmp_path: Path) -> None:
     assert status('orient', results, '-o', tmp_path, *options, *control) == 0
     found = read_network(tmp_path)
     assert found.points.unit == 'm'
-    assert np.abs(found.points.xyz - TRUE.start.points).max() < 0.2
+    assert np.abs(found.points.xyz - TRUE.state.points).max() < 0.2
     assert (tmp_path / 'control.csv').exists()
 
 
@@ -109,7 +109,7 @@ def test_control_points_give_their_frame(results: Path, tmp_path: Path) -> None:
 def test_a_wrong_bar_has_a_status_of_its_own(
     results: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], keep: bool
 ) -> None:
-    points = TRUE.start.points
+    points = TRUE.state.points
     lengths = [float(np.linalg.norm(points[2 * it] - points[2 * it + 1])) for it in range(3)]
     rows = [(2 * it + 1, 2 * it + 2, length, 0.01) for it, length in enumerate(lengths)]
     rows[1] = (*rows[1][:2], lengths[1] + 5, 0.01)
@@ -238,7 +238,7 @@ def test_a_robot_says_where_its_camera_is(
     base = Transform(np.asarray(cv2.Rodrigues((3.0, 0.1, 0.2))[0]), np.array([0.8, 0.1, -0.2]))
     rows = [('image', 'x', 'y', 'z', 'rx', 'ry', 'rz')]
     for name, rotation, position in zip(
-        TRUE.network.photographs, TRUE.start.rotations, TRUE.start.positions, strict=True
+        TRUE.network.photographs, TRUE.state.rotations, TRUE.state.positions, strict=True
     ):
         robot = base @ Transform(rotation.T, 1e-3 * position) @ mount.inverse
         rows.append(

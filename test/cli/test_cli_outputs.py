@@ -132,7 +132,7 @@ def stage(tmp_path_factory: pytest.TempPathFactory) -> Path:
         write_network(made / name, solution())
     shutil.copyfile(made / 'net' / 'camera_ros.yaml', made / 'camera.yaml')
     write_truth(made / 'truth.csv', {'view_0.jpg': ()})
-    points = dict(zip(network.targets, solution(3, 8).start.points.tolist(), strict=True))
+    points = dict(zip(network.targets, solution(3, 8).state.points.tolist(), strict=True))
     tables = {
         'points.csv': [['id', 'x', 'y', 'z'], *([name, *xyz] for name, xyz in points.items())],
         'known.csv': [

@@ -15,7 +15,7 @@ from ahf_ros.network.datum import Datum, movements
 from ahf_ros.network.network import CameraView, ControlPoint, Network, ScaleBar
 from ahf_ros.network.refinement import refine
 from ahf_ros.network.similarity import similarity_between
-from ahf_ros.network.solution import Start
+from ahf_ros.network.solution import NetworkState
 from benchmarks.network_errors import RELEASED, counted, coverage
 from support.camcal import dbat, folder, in_dbat_units, solve
 from support.network_scenes import Field, approximate, simulate
@@ -23,7 +23,7 @@ from support.network_scenes import Field, approximate, simulate
 pytest.importorskip('scipy')
 FIELD = Field(photographs=10, targets=20)
 
-Scene: TypeAlias = tuple[Network, Start, Start]
+Scene: TypeAlias = tuple[Network, NetworkState, NetworkState]
 """A network, its true values, and others to start from."""
 
 
@@ -66,7 +66,7 @@ def test_stages_release_what_is_significant(scene: Scene) -> None:
     sigma = np.sqrt(np.diag(solution.camera_covariances[0]))
     assert (sigma[free] > 0).all()
     assert (sigma[~free] == 0).all()
-    error = (solution.start.calibrations[0] - truth.calibrations[0])[:3]
+    error = (solution.state.calibrations[0] - truth.calibrations[0])[:3]
     assert (np.abs(error) < 5 * np.maximum(sigma[:3], 0.5)).all()
 
 
@@ -76,8 +76,8 @@ def test_covariances_are_those_of_the_whole_inverse(scene: Scene) -> None:
     solution = adjust(network, start, release=('f',), test=False)
     numbers, poses = 3 * len(network.targets), len(network.photographs)
     free = np.isin(PARAMETERS, ['f'])[None]
-    layout = normals.lay_out(network, solution.start, solution.start.used, free)
-    design = normals.linearise(layout, solution.start)
+    layout = normals.lay_out(network, solution.state, solution.state.used, free)
+    design = normals.linearise(layout, solution.state)
     whole = np.zeros((len(layout.xy), 2, numbers + 1 + 6 * poses))
     for row in range(len(layout.xy)):
         point, image = 3 * layout.point[row], numbers + 1 + 6 * layout.photograph[row]
@@ -86,7 +86,7 @@ def test_covariances_are_those_of_the_whole_inverse(scene: Scene) -> None:
         whole[row, :, image : image + 6] = design.by_pose[row]
     whole = whole.reshape(-1, whole.shape[2])
     border = np.zeros((whole.shape[1], 7))
-    border[:numbers] = movements(solution.start.points)
+    border[:numbers] = movements(solution.state.points)
     matrix = np.block([[whole.T @ whole, border], [border.T, np.zeros((7, 7))]])
     size = 1 / np.sqrt(np.maximum(np.diag(matrix), 1))
     inverse = size[:, None] * np.linalg.inv(size[:, None] * matrix * size) * size
@@ -162,10 +162,10 @@ def test_bars_give_scale_and_redundancy(scene: Scene) -> None:
         replace(network, bars=bars, unit='mm'), start, release=('f', 'k1', 'k2'), test=False
     )
     assert solution.redundancy == without.redundancy + 1  # two bars, one degree of freedom less
-    assert distance(solution.start.points, 0, 1) == pytest.approx(bars[0].length, abs=0.05)
+    assert distance(solution.state.points, 0, 1) == pytest.approx(bars[0].length, abs=0.05)
     exact = (replace(bars[0], sigma=0.0),)
     solution = adjust(replace(network, bars=exact), start, release=('f',), test=False)
-    assert distance(solution.start.points, 0, 1) == pytest.approx(bars[0].length, abs=1e-8)
+    assert distance(solution.state.points, 0, 1) == pytest.approx(bars[0].length, abs=1e-8)
 
 
 @pytest.mark.parametrize('planar', [False, True])
@@ -179,7 +179,7 @@ def test_a_known_field_calibrates_its_camera(planar: bool, sigma: float) -> None
     )
     network = replace(network, control=control, unit='m')
     solution = adjust(network, approximate(truth, random))
-    error = solution.start.calibrations[0] - truth.calibrations[0]
+    error = solution.state.calibrations[0] - truth.calibrations[0]
     deviations = np.sqrt(np.diag(solution.camera_covariances[0]))
     assert (np.abs(error) < 3.5 * deviations).all()
     assert deviations[0] < 1
@@ -193,7 +193,7 @@ def test_photographs_without_rolls_know_less_of_the_principal_point_and_say_so()
         random = np.random.default_rng(13)
         network, truth = simulate(replace(FIELD, rolled=rolled), random)
         solution = adjust(network, approximate(truth, random))
-        errors.append(solution.start.calibrations[0, 1:3] - truth.calibrations[0, 1:3])
+        errors.append(solution.state.calibrations[0, 1:3] - truth.calibrations[0, 1:3])
         deviations.append(np.sqrt(np.diag(solution.camera_covariances[0])[1:3]))
     assert (np.abs(errors) < 3.5 * np.array(deviations)).all()
     assert (deviations[1] > 1.3 * deviations[0]).all()
@@ -215,7 +215,7 @@ def test_heavy_tails_are_no_reason_to_reject() -> None:
         xy = exact + heavier * (seen.xy - exact)
         start = approximate(truth, random, 0.005)
         solution = adjust(replace(network, observations=replace(seen, xy=xy)), start)
-        kept += solution.start.used.mean() / 3
+        kept += solution.state.used.mean() / 3
         expected += solution.expected_rejections
         assert not any('at two places' in text for text in solution.warnings)
     assert kept > 0.99
@@ -228,10 +228,10 @@ def test_fixed_control_points_stay(scene: Scene) -> None:
     solution = adjust(replace(network, control=control), start, release=RELEASED, test=False)
     for point in control:
         place = int(point.name)
-        np.testing.assert_allclose(solution.start.points[place], point.xyz, atol=1e-8)
+        np.testing.assert_allclose(solution.state.points[place], point.xyz, atol=1e-8)
         block = solution.covariance_of_points[3 * place : 3 * place + 3]
         np.testing.assert_allclose(block, 0, atol=1e-12)
-    error = solution.start.points - (1000 * truth.points + 5)
+    error = solution.state.points - (1000 * truth.points + 5)
     assert np.abs(error).max() < 1
 
 
@@ -248,7 +248,7 @@ def test_image_points_that_fit_badly_are_a_warning(scene: Scene) -> None:
 def test_three_fixed_targets_are_the_axes(scene: Scene) -> None:
     network, _, start = scene
     solution = adjust(network, start, Datum('fixed', ('0', '1', '2')), ('f',), test=False)
-    points = solution.start.points
+    points = solution.state.points
     np.testing.assert_allclose(points[0], 0, atol=1e-12)
     np.testing.assert_allclose(points[1, 1:], 0, atol=1e-12)
     assert abs(points[2, 2]) < 1e-12
@@ -257,7 +257,9 @@ def test_three_fixed_targets_are_the_axes(scene: Scene) -> None:
     assert solution.sigma0 == pytest.approx(inner.sigma0, rel=1e-6)
 
 
-def bars_of(truth: Start, factors: Sequence[float], sigma: float = 0.0002) -> tuple[ScaleBar, ...]:
+def bars_of(
+    truth: NetworkState, factors: Sequence[float], sigma: float = 0.0002
+) -> tuple[ScaleBar, ...]:
     """Return bars between targets 0-1, 2-3 and so on, longer than they are by factors."""
     ends = [(2 * place, 2 * place + 1) for place in range(len(factors))]
     return tuple(
@@ -291,7 +293,7 @@ def test_a_wrong_bar_is_named_and_no_ray_is_lost(scene: Scene, factor: float) ->
     assert suspect.probability < 1e-6
     assert any(text.startswith('scale bar 2-3 contradicts the rest') for text in solution.warnings)
     assert not solution.rejected
-    assert distance(solution.start.points, 0, 1) == pytest.approx(
+    assert distance(solution.state.points, 0, 1) == pytest.approx(
         distance(truth.points, 0, 1), abs=0.002
     )
     kept = adjust(network, start, keep_suspects=True)
@@ -306,7 +308,7 @@ def test_of_two_bars_that_contradict_both_are_named(scene: Scene) -> None:
     (suspect,) = solution.suspects
     assert suspect.verdict == 'unclear'
     assert {suspect.name, *suspect.rivals} == {'scale bar 0-1', 'scale bar 2-3'}
-    scale = distance(solution.start.points, 0, 1) / distance(truth.points, 0, 1)
+    scale = distance(solution.state.points, 0, 1) / distance(truth.points, 0, 1)
     assert 1 < scale < 1.01
     sigma = solution.network.bars[0].sigma / distance(truth.points, 0, 1)
     assert sigma > 0.002  # what they contradict each other by is in the covariance
@@ -498,7 +500,7 @@ def test_photographs_of_a_plane_straight_on_do_not_determine_the_focal_length() 
     network = replace(network, observations=replace(observations, xy=xy))
     start = replace(truth, rotations=rotations, positions=positions)
     solution = adjust(network, start)
-    assert solution.camera_covariances[0][0, 0] > (0.03 * solution.start.calibrations[0, 0]) ** 2
+    assert solution.camera_covariances[0][0, 0] > (0.03 * solution.state.calibrations[0, 0]) ** 2
     assert any('do not determine the focal length' in text for text in solution.warnings)
 
 
@@ -507,7 +509,7 @@ def test_a_focal_length_that_was_given_wrongly_is_named(scene: Scene) -> None:
     for given, named in ((1280.0, True), (3150.0, False)):
         view = CameraView('camera', 4000, 3000, given)
         solution = adjust(replace(network, cameras=(view,)), start)
-        assert solution.start.calibrations[0, 0] == pytest.approx(truth.calibrations[0, 0], abs=1)
+        assert solution.state.calibrations[0, 0] == pytest.approx(truth.calibrations[0, 0], abs=1)
         text = 'focal length is 3200 px, and 1280 px was given'
         assert any(text in it for it in solution.warnings) == named
 
@@ -517,7 +519,7 @@ def test_a_fixed_camera_stays(scene: Scene) -> None:
     view = CameraView('camera', 4000, 3000, calibration=truth.calibrations[0], fixed=True)
     start = replace(start, calibrations=truth.calibrations.copy())
     solution = adjust(replace(network, cameras=(view,)), start)
-    np.testing.assert_array_equal(solution.start.calibrations, truth.calibrations)
+    np.testing.assert_array_equal(solution.state.calibrations, truth.calibrations)
     assert not solution.camera_covariances[0].any()
 
 

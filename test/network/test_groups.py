@@ -14,12 +14,12 @@ from support.networks import known, solution
 def group(photographs: list[int], targets: list[int]) -> Solution:
     """Return a solution of a part of the network: values of everything else are NaN."""
     whole = replace(solution(), network=known(solution().network))
-    start = whole.start
+    start = whole.state
     positions, points = np.full_like(start.positions, np.nan), np.full_like(start.points, np.nan)
     positions[photographs], points[targets] = start.positions[photographs], start.points[targets]
     return replace(
         whole,
-        start=replace(start, positions=positions, points=points),
+        state=replace(start, positions=positions, points=points),
         rejected=(Rejection('view_0.jpg', '1', (1.0, 2.0), 'why', 5.0),),
     )
 
@@ -40,7 +40,7 @@ def test_groups_are_networks_of_their_own() -> None:
     rows = [12 * photograph + target for photograph in (4, 5) for target in range(4, 9)]
     np.testing.assert_array_equal(seen.xy, whole.network.observations.xy[rows])
     np.testing.assert_array_equal(second.residuals, whole.residuals[rows])
-    np.testing.assert_array_equal(second.start.points, whole.start.points[4:9])
+    np.testing.assert_array_equal(second.state.points, whole.state.points[4:9])
     np.testing.assert_array_equal(
         second.covariance_of_points, whole.covariance_of_points[12:27, 12:27]
     )

@@ -120,8 +120,8 @@ def network() -> Solution:
 def robot_poses(network: Solution, mount: Transform, base: Transform) -> dict[str, Transform]:
     """Return exact poses of the hand, in metres, for all photographs of the left camera."""
     poses = {}
-    for index in range(0, len(network.start.positions), 2):
-        seen = Transform(network.start.rotations[index].T, 1e-3 * network.start.positions[index])
+    for index in range(0, len(network.state.positions), 2):
+        seen = Transform(network.state.rotations[index].T, 1e-3 * network.state.positions[index])
         poses[network.network.photographs[index]] = base @ seen @ mount.inverse
     return poses
 
@@ -178,12 +178,12 @@ def test_a_rig_of_two_cameras(network: Solution) -> None:
     truth = Transform(
         np.asarray(cv2.Rodrigues(random.normal(0, 0.3, 3))[0]), np.array([0.2, 0, 0.01])
     )
-    rotations, positions = network.start.rotations.copy(), network.start.positions.copy()
+    rotations, positions = network.state.rotations.copy(), network.state.positions.copy()
     for index in range(0, len(positions), 2):
         left = Transform(rotations[index].T, 1e-3 * positions[index])
         right = left @ truth
         rotations[index + 1], positions[index + 1] = right.rotation.T, 1e3 * right.translation
-    rig = replace(network, start=replace(network.start, rotations=rotations, positions=positions))
+    rig = replace(network, state=replace(network.state, rotations=rotations, positions=positions))
     stations = {name: str(index // 2) for index, name in enumerate(network.network.photographs)}
     reference, result, _ = mounted_on_rig(rig, stations)
     assert reference == 'left'

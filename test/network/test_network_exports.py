@@ -23,19 +23,19 @@ XY = WHOLE.network.observations.xy - WHOLE.residuals  # computed
 
 def exact() -> Solution:
     """Return the network with computed image points, and without shear, which COLMAP lacks."""
-    calibration = WHOLE.start.calibrations.copy()
+    calibration = WHOLE.state.calibrations.copy()
     calibration[0, 9] = 0
     shear = XY.copy()
     for row in range(len(XY)):
         shear[row] = brown(calibration[0], WHOLE, row)
     observations = replace(WHOLE.network.observations, xy=shear)
     network = replace(WHOLE.network, observations=observations)
-    return replace(WHOLE, network=network, start=replace(WHOLE.start, calibrations=calibration))
+    return replace(WHOLE, network=network, state=replace(WHOLE.state, calibrations=calibration))
 
 
 def local(of: Solution, row: int) -> np.ndarray:
     """Return the direction of an observation in the frame of its camera, z = 1."""
-    seen, start = of.network.observations, of.start
+    seen, start = of.network.observations, of.state
     index = seen.photograph[row]
     x = start.rotations[index] @ (start.points[seen.point[row]] - start.positions[index])
     return np.asarray(x / x[2])
@@ -90,11 +90,11 @@ def test_pycolmap_reads_the_model(tmp_path: Path) -> None:
     model = pycolmap.Reconstruction(str(tmp_path))
     assert len(model.images) == 6 and len(model.points3D) == 12
     for index, point in model.points3D.items():
-        np.testing.assert_allclose(point.xyz, wanted.start.points[index - 1], rtol=1e-9)
+        np.testing.assert_allclose(point.xyz, wanted.state.points[index - 1], rtol=1e-9)
         assert point.track.length() == 6
     for index, image in model.images.items():
         centre = image.projection_center()
-        np.testing.assert_allclose(centre, wanted.start.positions[index - 1], atol=1e-9)
+        np.testing.assert_allclose(centre, wanted.state.positions[index - 1], atol=1e-9)
         for seen in image.points2D:
             shown = image.project_point(model.points3D[seen.point3D_id].xyz)
             np.testing.assert_allclose(shown, seen.xy, atol=1e-5)
@@ -160,7 +160,7 @@ def test_mmvii_projects_its_points_onto_its_measures(tmp_path: Path) -> None:
         name = (item.findtext('Name') or '').strip('"')
         points[name] = numbers(item, 'Pt')
         covariances[name] = numbers(item, '__Opt__Sigma2')
-    np.testing.assert_allclose(points['3'], WHOLE.start.points[2], rtol=1e-12)
+    np.testing.assert_allclose(points['3'], WHOLE.state.points[2], rtol=1e-12)
     block = WHOLE.covariance_of_points[6:9, 6:9]
     np.testing.assert_allclose(covariances['3'], block[[0, 0, 0, 1, 1, 2], [0, 1, 2, 1, 2, 2]])
     for index, image in enumerate(WHOLE.network.photographs):
@@ -195,11 +195,11 @@ def numbers(element: ElementTree.Element, path: str) -> np.ndarray:
 
 
 def test_what_has_no_place_is_left_out(tmp_path: Path) -> None:
-    start = WHOLE.start
+    start = WHOLE.state
     points, positions = start.points.copy(), start.positions.copy()
     points[0] = positions[1] = np.nan
     used = (WHOLE.network.observations.point != 0) & (WHOLE.network.observations.photograph != 1)
-    part = replace(WHOLE, start=replace(start, points=points, positions=positions, used=used))
+    part = replace(WHOLE, state=replace(start, points=points, positions=positions, used=used))
     for name in NETWORK_FORMATS:
         for path in write_network_export(name, tmp_path / name, part):
             text = path.read_bytes().decode('latin-1')

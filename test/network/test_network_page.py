@@ -30,12 +30,12 @@ WRONG = Rejection('view_1.jpg', '9', (812.0, 600.0), 'another target <b>', 7.25)
 def network() -> Solution:
     """Return a network with everything that a page can show."""
     whole = solution()
-    used = whole.start.used.copy()
+    used = whole.state.used.copy()
     used[12 + 8] = False
     return replace(
         whole,
         network=known(whole.network),
-        start=replace(whole.start, used=used),
+        state=replace(whole.state, used=used),
         rejected=(WRONG,),
         warnings=('a warning & more',),
         expected_rejections=0.2,
@@ -68,12 +68,12 @@ def test_the_page_shows_what_was_found(tmp_path: Path) -> None:
 def test_a_page_of_little_is_a_page(tmp_path: Path) -> None:
     """One photograph has no pose, a target no place, nothing gives a scale."""
     whole = solution(unit='')
-    positions, points = whole.start.positions.copy(), whole.start.points.copy()
+    positions, points = whole.state.positions.copy(), whole.state.points.copy()
     positions[1] = points[2] = np.nan
     used = (whole.network.observations.photograph != 1) & (whole.network.observations.point != 2)
     residuals = np.where(used[:, None], whole.residuals, np.nan)
-    start = replace(whole.start, positions=positions, points=points, used=used)
-    part = replace(whole, start=start, residuals=residuals)
+    start = replace(whole.state, positions=positions, points=points, used=used)
+    part = replace(whole, state=start, residuals=residuals)
     (tmp_path / 'report.html').write_bytes(network_page(part, 'little'))
     text = (tmp_path / 'report.html').read_text()
     assert 'no pose' in text and 'has no scale' in text
@@ -94,7 +94,7 @@ def test_a_view_shows_places_in_proportion() -> None:
         )  # type: ignore[union-attr]
         for group in figure.findall("g[@class='target']")
     }
-    points = whole.start.points
+    points = whole.state.points
     axes = np.linalg.svd(points - points.mean(axis=0))[2][:2]
     flat = points @ axes.T
     drawn = np.array([centres[name] for name in whole.network.targets])
@@ -124,7 +124,7 @@ def test_scale_bars_of_views_are_as_long_as_they_say() -> None:
     for bar in figure.findall("path[@class='bar']"):
         begin, end = re.findall(r'[MH]([0-9.]+)', bar.attrib['d'])
         drawn.append(float(end) - float(begin))
-    known = whole.start.points @ np.linalg.svd(np.cov(whole.start.points.T))[0][:, 0]
+    known = whole.state.points @ np.linalg.svd(np.cov(whole.state.points.T))[0][:, 0]
     circles = [float(it.attrib['cx']) for it in figure.findall('g/circle')]
     scale = np.ptp(circles) / np.ptp(known)
     assert drawn[0] == pytest.approx(scale * lengths[0], abs=0.3)
@@ -135,7 +135,7 @@ def test_scale_bars_of_views_are_as_long_as_they_say() -> None:
 def test_the_scene_has_what_is_known_in_its_place() -> None:
     whole = network()
     shown = json.loads(json.dumps(scene(whole)))
-    points = whole.start.points  # along the axes of the coordinates, as there are control points
+    points = whole.state.points  # along the axes of the coordinates, as there are control points
     places = np.array(shown['places'])
     np.testing.assert_allclose(places - places[0], points - points[0], atol=1e-3)
     assert (shown['targets'], shown['axes']) == (list(whole.network.targets), ['x', 'y', 'z'])
@@ -146,9 +146,9 @@ def test_the_scene_has_what_is_known_in_its_place() -> None:
     expected = factor * whole.point_covariances[7]
     np.testing.assert_allclose(np.triu(spread), np.triu(expected), rtol=1e-3, atol=1e-3)
     cameras = np.array(shown['cameras'])
-    positions = whole.start.positions - (points.min(axis=0) + points.max(axis=0)) / 2
+    positions = whole.state.positions - (points.min(axis=0) + points.max(axis=0)) / 2
     np.testing.assert_allclose(cameras[:, :3], positions, atol=1e-3)
-    np.testing.assert_allclose(cameras[:, 3:6], whole.start.rotations[:, 2], atol=1e-3)
+    np.testing.assert_allclose(cameras[:, 3:6], whole.state.rotations[:, 2], atol=1e-3)
 
 
 _PICTURE = "return document.getElementById('turning').toDataURL()"

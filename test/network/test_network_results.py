@@ -31,7 +31,7 @@ KEYS = {
 def incomplete() -> Solution:
     """Return a network with a photograph without a pose, a target without a place, a wrong ID."""
     whole = solution()
-    start = whole.start
+    start = whole.state
     photographs, points = start.positions.copy(), start.points.copy()
     photographs[4] = points[2] = np.nan
     covariance = whole.covariance_of_points.copy()
@@ -40,7 +40,7 @@ def incomplete() -> Solution:
     used &= whole.network.observations.point != 2
     return replace(
         whole,
-        start=replace(start, positions=photographs, points=points, used=used),
+        state=replace(start, positions=photographs, points=points, used=used),
         covariance_of_points=covariance,
         rejected=(Rejection('view_1.jpg', '9', (1.0, 2.0), 'another target', -7.25),),
         warnings=('no scale',),
@@ -61,10 +61,10 @@ def test_a_network_is_read_back_as_it_was_written(tmp_path: Path) -> None:
         assert points.scaled
         kept = [0, 1, 2, 3, 5]
         assert found.photographs == tuple(wanted.network.photographs[index] for index in kept)
-        np.testing.assert_array_equal(found.rotations, wanted.start.rotations[kept])
-        np.testing.assert_array_equal(found.positions, wanted.start.positions[kept])
+        np.testing.assert_array_equal(found.rotations, wanted.state.rotations[kept])
+        np.testing.assert_array_equal(found.positions, wanted.state.positions[kept])
         np.testing.assert_array_equal(found.pose_covariances, wanted.pose_covariances[kept])
-        np.testing.assert_allclose(found.calibrations, wanted.start.calibrations, rtol=1e-12)
+        np.testing.assert_allclose(found.calibrations, wanted.state.calibrations, rtol=1e-12)
         np.testing.assert_array_equal(found.camera_covariances, wanted.camera_covariances)
         assert found.rays.tolist() == [5] * 11
         assert [(it.target, it.normalised_residual) for it in found.rejected] == [('9', -7.25)]

@@ -33,7 +33,7 @@ RC = '{http://www.capturingreality.com/ns/xcr/1.1#}'
 
 def exact(*lacking: int, fisheye: bool = False) -> Solution:
     """Return the network without some parameters, its image points as they are computed."""
-    seen, start = WHOLE.network.observations, WHOLE.start
+    seen, start = WHOLE.network.observations, WHOLE.state
     calibrations = start.calibrations.copy()
     calibrations[0, list(lacking)] = 0
     if fisheye:
@@ -42,7 +42,7 @@ def exact(*lacking: int, fisheye: bool = False) -> Solution:
     xy = project(calibrations[0], *poses, start.points[seen.point], equidistant=fisheye)
     cameras = (replace(WHOLE.network.cameras[0], equidistant=fisheye),)
     network = replace(WHOLE.network, observations=replace(seen, xy=xy), cameras=cameras)
-    return replace(WHOLE, network=network, start=replace(start, calibrations=calibrations))
+    return replace(WHOLE, network=network, state=replace(start, calibrations=calibrations))
 
 
 def distorted(x: float, y: float, k: list[float], along_x: float, along_y: float) -> np.ndarray:
@@ -196,9 +196,9 @@ def test_pyopf_reads_the_calibration(tmp_path: Path) -> None:
     assert sensor.internals.focal_length_px == pytest.approx(1500.0, abs=0.1)
     assert tuple(found.input_cameras.sensors[0].image_size_px) == SIZE
     cameras = found.calibration.calibrated_cameras.cameras
-    np.testing.assert_allclose([it.position for it in cameras], WHOLE.start.positions)
+    np.testing.assert_allclose([it.position for it in cameras], WHOLE.state.positions)
     points = found.calibration.calibrated_control_points.points
-    np.testing.assert_allclose([it.coordinates for it in points], WHOLE.start.points)
+    np.testing.assert_allclose([it.coordinates for it in points], WHOLE.state.points)
 
 
 def test_the_converter_of_pix4d_has_our_poses(tmp_path: Path) -> None:
@@ -206,7 +206,7 @@ def test_the_converter_of_pix4d_has_our_poses(tmp_path: Path) -> None:
     converter = pytest.importorskip('opf_tools.opf2colmap.converter', reason=reason)
     write_network_export('opf', tmp_path, WHOLE)
     calibrated = json.loads((tmp_path / 'calibrated_cameras.json').read_text())
-    start = WHOLE.start
+    start = WHOLE.state
     for camera, rotation, position in zip(
         calibrated['cameras'], start.rotations, start.positions, strict=True
     ):
@@ -317,16 +317,16 @@ def test_bundler_projects_its_points_into_undistorted_photographs(tmp_path: Path
 
 
 def test_what_a_lens_lacks_is_said_with_its_size() -> None:
-    lens = WHOLE.start.calibrations[0]
+    lens = WHOLE.state.calibrations[0]
     seen = np.array([[0.0, 0.0], [1599.0, 0.0], [0.0, 1199.0], [1599.0, 1199.0]])
     y = (seen[:, 1] - lens[2]) / lens[0]
     largest = np.abs(lens[0] * lens[SHEAR] * y).max()
     assert 0 < largest < 0.02
     assert network_remark('colmap', WHOLE) == network_remark('metashape', WHOLE) == ''
     assert network_remark('openmvg', WHOLE).startswith('openmvg has no affinity and shear: its ')
-    calibrations = WHOLE.start.calibrations.copy()
+    calibrations = WHOLE.state.calibrations.copy()
     calibrations[0, SHEAR] *= 100
-    sheared = replace(WHOLE, start=replace(WHOLE.start, calibrations=calibrations))
+    sheared = replace(WHOLE, state=replace(WHOLE.state, calibrations=calibrations))
     expected = f'colmap has no shear: its image points differ by up to {100 * largest:.2f} px'
     assert network_remark('colmap', sheared) == expected
 
@@ -337,7 +337,7 @@ def test_ply_has_targets_with_their_precision(tmp_path: Path) -> None:
     kinds = {'double': '<f8', 'float': '<f4', 'int': '<i4'}
     fields = [it.split()[1:] for it in header.decode().splitlines() if it.startswith('property')]
     vertices = np.frombuffer(body, [(name, kinds[kind]) for kind, name in fields])
-    np.testing.assert_array_equal([vertices[it] for it in 'xyz'], WHOLE.start.points.T)
+    np.testing.assert_array_equal([vertices[it] for it in 'xyz'], WHOLE.state.points.T)
     sigmas = np.sqrt(np.diag(WHOLE.covariance_of_points)).reshape(-1, 3)
     written = [vertices[f'sigma_{it}'] for it in 'xyz']
     np.testing.assert_allclose(written, sigmas.T, rtol=1e-6)
@@ -357,7 +357,7 @@ def test_dxf_has_points_and_their_names(tmp_path: Path) -> None:
     assert groups[-1] == (0, 'EOF') and (1, 'AC1009') in groups
     points = [it for it in entities if it[0] == 'POINT']
     places = [[float(it[code]) for code in (10, 20, 30)] for it in points]
-    np.testing.assert_allclose(places, WHOLE.start.points, rtol=1e-11)
+    np.testing.assert_allclose(places, WHOLE.state.points, rtol=1e-11)
     texts = [it for it in entities if it[0] == 'TEXT']
     assert [it[1] for it in texts] == list(WHOLE.network.targets)
     height = float(texts[0][40])
@@ -370,7 +370,7 @@ def test_vstars_lists_have_the_form_of_its_own(tmp_path: Path, gsi_list: Path | 
     path = tmp_path / 'vstars_xyz.csv'
     found = read_points(path)
     assert list(found) == [f'CODE{name}' for name in WHOLE.network.targets]
-    np.testing.assert_allclose(list(found.values()), WHOLE.start.points, atol=1e-3)
+    np.testing.assert_allclose(list(found.values()), WHOLE.state.points, atol=1e-3)
     rows = [line.split(',') for line in path.read_bytes().decode().split('\r\n')[:-1]]
     sigmas = np.sqrt(np.diag(WHOLE.covariance_of_points)).reshape(-1, 3)
     np.testing.assert_allclose([floats(it[4:7]) for it in rows], sigmas, atol=1e-3)
@@ -394,7 +394,7 @@ def test_jag3d_has_the_whole_covariance(tmp_path: Path) -> None:
     assert [it[0] for it in rows] == [name for name in WHOLE.network.targets for _ in range(3)]
     assert [it[1] for it in rows] == list('XYZ') * 12
     assert [int(it[3]) for it in rows] == list(range(36))
-    np.testing.assert_allclose(floats(it[2] for it in rows), WHOLE.start.points.ravel())
+    np.testing.assert_allclose(floats(it[2] for it in rows), WHOLE.state.points.ravel())
     matrix = np.loadtxt(tmp_path / 'jag3d.cxx')
     np.testing.assert_allclose(matrix, WHOLE.covariance_of_points, rtol=1e-14)
     points = [line.split() for line in (tmp_path / 'jag3d_points.txt').read_text().splitlines()]
@@ -427,7 +427,7 @@ def test_colmap_has_the_fisheye_lens_of_opencv(tmp_path: Path) -> None:
     assert (model, int(width), int(height)) == ('OPENCV_FISHEYE', *SIZE)
     fx, fy, cx, cy, *k = floats(lens)
     matrix = np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1]])
-    seen, start = wanted.network.observations, wanted.start
+    seen, start = wanted.network.observations, wanted.state
     turned = start.points[seen.point] - start.positions[seen.photograph]
     there = np.einsum('nij,nj->ni', start.rotations[seen.photograph], turned)
     none = np.zeros((1, 3))
@@ -443,7 +443,7 @@ def test_metashape_has_a_distorted_equidistant_lens(tmp_path: Path) -> None:
     sensor = ElementTree.parse(tmp_path / 'cameras.xml').find('.//sensor')
     assert lens.pop('projection') == sensor.attrib['type'] == 'fisheye'
     value = {name: float(text) for name, text in lens.items()}
-    seen, start = wanted.network.observations, wanted.start
+    seen, start = wanted.network.observations, wanted.state
     shown = []
     for photograph, point in zip(seen.photograph, seen.point, strict=True):
         ray = start.rotations[photograph] @ (start.points[point] - start.positions[photograph])

@@ -71,9 +71,9 @@ def oriented_by_five() -> Solution:
 
 
 def error(solution: Any, truth: np.ndarray) -> float:
-    known = np.isfinite(solution.start.points[:, 0])
+    known = np.isfinite(solution.state.points[:, 0])
     assert known.mean() > 0.95
-    return float(np.abs(deviations(solution.start.points[known], truth[known])).max())
+    return float(np.abs(deviations(solution.state.points[known], truth[known])).max())
 
 
 @pytest.mark.parametrize('depth', [0.0, 0.3])
@@ -82,8 +82,8 @@ def test_nothing_but_ids_orients_a_network(depth: float, focal: float | None) ->
     seen = taken(depth=depth, focal=focal)
     (solution,) = orient(seen.network)
     assert error(solution, seen.points) < 1e-3
-    assert np.isfinite(solution.start.positions).all()
-    assert solution.start.calibrations[0, 0] == pytest.approx(FOCAL, rel=5e-3)
+    assert np.isfinite(solution.state.positions).all()
+    assert solution.state.calibrations[0, 0] == pytest.approx(FOCAL, rel=5e-3)
     assert 0.8 < solution.sigma0 < 1.2
 
 
@@ -92,7 +92,7 @@ def test_nothing_but_ids_orients_a_network(depth: float, focal: float | None) ->
 def test_a_lens_with_distortion_that_nobody_gave(k1: float) -> None:
     seen = taken(count=5, lens={'k1': k1, 'cx': 50.0, 'cy': -40.0})
     (solution,) = orient(seen.network)
-    assert np.isfinite(solution.start.positions).all()
+    assert np.isfinite(solution.state.positions).all()
     assert error(solution, seen.points) < 2e-3
 
 
@@ -102,8 +102,8 @@ def test_half_of_the_photographs_of_the_panel() -> None:
     every = read_observations(ROOT / 'docs' / 'examples' / 'panel.csv')
     network, _ = make_network(every[::2])
     (solution,) = orient(network)
-    assert np.isfinite(solution.start.positions).all()
-    places = dict(zip(network.targets, solution.start.points, strict=True))
+    assert np.isfinite(solution.state.positions).all()
+    places = dict(zip(network.targets, solution.state.points, strict=True))
     first, second = (np.linalg.norm(places[a] - places[b]) for a, b in (('5', '60'), ('22', '70')))
     assert first / second == pytest.approx(608.8297 / 747.6563, rel=2e-4)
 
@@ -115,7 +115,7 @@ def test_the_frame_is_that_of_the_principal_axes() -> None:
     spread = points.T @ points
     np.testing.assert_allclose(spread, np.diag(np.diag(spread)), atol=1e-3 * spread.max())
     assert (np.diff(np.diag(spread)) < 0).all()
-    assert (solution.start.positions[:, 2] > 0).all()
+    assert (solution.state.positions[:, 2] > 0).all()
 
 
 @pytest.mark.lasting
@@ -144,9 +144,9 @@ def test_a_fisheye_lens_is_fitted() -> None:
     (solution,) = orient(replace(network, cameras=cameras, observations=observations))
     assert any('an equidistant fisheye one' in text for text in solution.warnings)
     assert solution.network.cameras[0].equidistant
-    assert solution.oriented.all() and solution.start.used.all()
+    assert solution.oriented.all() and solution.state.used.all()
     assert solution.released[0] == ('f', 'cx', 'cy', 'k1', 'k2', 'k3', 'k4', 'affinity', 'shear')
-    found = solution.start.calibrations[0, :3] - [900, 1499.5, 999.5]
+    found = solution.state.calibrations[0, :3] - [900, 1499.5, 999.5]
     assert (np.abs(found) < 4 * np.sqrt(np.diag(solution.camera_covariances[0])[:3])).all()
 
 
@@ -189,7 +189,7 @@ def test_wrong_ids_are_named() -> None:
 def test_the_same_network_gives_the_same_bits() -> None:
     first = oriented_by_five()
     (second,) = orient(taken(count=5, focal=FOCAL).network)
-    assert np.array_equal(first.start.points, second.start.points, equal_nan=True)
+    assert np.array_equal(first.state.points, second.state.points, equal_nan=True)
 
 
 @pytest.mark.lasting
@@ -224,8 +224,8 @@ def of_few(number: int, changed: int | None = None) -> Network:
 def test_four_targets_orient_a_photograph_if_they_agree() -> None:
     (solution,) = orient(of_few(4))
     assert solution.oriented.all() and not any('not oriented' in it for it in solution.warnings)
-    whole = oriented_by_five().start
-    few = solution.start
+    whole = oriented_by_five().state
+    few = solution.state
     turns = [it.rotations[4] @ it.rotations[0].T for it in (whole, few)]
     assert np.abs(turns[0] - turns[1]).max() < 1e-3
     for network, reason in ((of_few(4, 2), 'no pose fits well'), (of_few(3), 'fewer than 4')):
@@ -242,7 +242,7 @@ def test_groups_that_do_not_hang_together_are_oriented_each_by_itself() -> None:
     point = observed.point + 30 * (observed.photograph % 2)
     network = replace(seen.network, targets=names, observations=replace(observed, point=point))
     solutions = orient(network)
-    posed = [np.isfinite(one.start.positions[:, 0]) for one in solutions]
+    posed = [np.isfinite(one.state.positions[:, 0]) for one in solutions]
     assert len(solutions) == 2
     assert np.array_equal(posed[0], ~posed[1])
 
@@ -258,7 +258,7 @@ def test_portrait_and_landscape_are_two_cameras() -> None:
     seen = photographed(points, rotations, positions, cameras, of, calibrations, random)
     (solution,) = orient(seen.network)
     assert error(solution, points) < 1e-3
-    assert solution.start.calibrations[:, 0] == pytest.approx(FOCAL, rel=5e-3)
+    assert solution.state.calibrations[:, 0] == pytest.approx(FOCAL, rel=5e-3)
 
 
 def zooming(zooms: Sequence[float]) -> tuple[Rendered, np.ndarray]:
@@ -277,7 +277,7 @@ def test_another_zoom_gets_a_camera_of_its_own() -> None:
     assert solution.oriented.all()
     assert any('2 of 8 photographs, such as 3.png' in it for it in solution.warnings)
     assert solution.network.camera_of.tolist() == [0, 0, 0, 1, 1, 0, 0, 0]
-    assert solution.start.calibrations[:, 0] == pytest.approx([FOCAL, 1.2 * FOCAL], rel=0.01)
+    assert solution.state.calibrations[:, 0] == pytest.approx([FOCAL, 1.2 * FOCAL], rel=0.01)
     assert error(solution, points) < 1e-3
 
 
@@ -287,7 +287,7 @@ def test_each_photograph_may_have_its_own_zoom() -> None:
     seen, points = zooming(zooms)
     (solution,) = orient(seen.network)
     assert solution.oriented.all()
-    focal = solution.start.calibrations[solution.network.camera_of, 0]
+    focal = solution.state.calibrations[solution.network.camera_of, 0]
     assert focal == pytest.approx(FOCAL * zooms, rel=0.01)
     assert error(solution, points) < 1e-3
 
@@ -342,7 +342,7 @@ def test_who_watches_is_told_stages_photographs_and_iterations() -> None:
     network = taken(focal=FOCAL).network
     seen: list[Progress] = []
     solutions = orient(network, progress=seen.append)
-    assert np.array_equal(solutions[0].start.points, orient(network)[0].start.points)
+    assert np.array_equal(solutions[0].state.points, orient(network)[0].state.points)
     assert len(seen) > len({str(it) for it in seen}) / 2 > 5
     assert all(a != b for a, b in pairwise(seen))
     posed = [it.done for it in seen if it.stage == 'start values' and not it.iteration]

@@ -19,7 +19,7 @@ def used_by(number: int, photographs: list[int]) -> Solution:
     whole = solution()
     seen = whole.network.observations
     used = (seen.point != number) | np.isin(seen.photograph, photographs)
-    return replace(whole, start=replace(whole.start, used=used))
+    return replace(whole, state=replace(whole.state, used=used))
 
 
 def advice(of: Solution, part: str) -> list[str]:
@@ -29,12 +29,12 @@ def advice(of: Solution, part: str) -> list[str]:
 def test_rays_and_angles_are_those_of_used_observations() -> None:
     weak = used_by(3, [1, 2])
     assert rays_of(weak).tolist() == [6, 6, 6, 2, *[6] * 8]
-    rays = weak.start.positions[[1, 2]] - weak.start.points[3]
+    rays = weak.state.positions[[1, 2]] - weak.state.points[3]
     first, second = rays / np.linalg.norm(rays, axis=1)[:, None]
-    angles = largest_angles(weak.network, weak.start)
+    angles = largest_angles(weak.network, weak.state)
     assert angles[3] == pytest.approx(np.arccos(first @ second))
     alone = used_by(3, [1])
-    assert np.isnan(largest_angles(alone.network, alone.start)[3])
+    assert np.isnan(largest_angles(alone.network, alone.state)[3])
 
 
 def test_semi_axes_are_those_of_the_ellipsoid() -> None:
@@ -54,31 +54,31 @@ def test_weak_targets_are_named() -> None:
     covariance[:, 9:12] *= 10
     weak = replace(whole, covariance_of_points=covariance)
     assert advice(weak, 'Photograph 4 more often') != []
-    points = whole.start.points.copy()
+    points = whole.state.points.copy()
     points[3] = np.nan
-    lost = replace(whole, start=replace(whole.start, points=points))
+    lost = replace(whole, state=replace(whole.state, points=points))
     assert advice(lost, 'Photograph 4 from two sides') != []
 
 
 def test_weak_photographs_are_named() -> None:
     whole = solution()
-    positions = whole.start.positions.copy()
+    positions = whole.state.positions.copy()
     positions[2] = np.nan
-    lost = replace(whole, start=replace(whole.start, positions=positions))
+    lost = replace(whole, state=replace(whole.state, positions=positions))
     assert advice(lost, 'view_2.jpg: no pose') != []
     seen = whole.network.observations
     used = (seen.photograph != 1) | (seen.point < 5)
-    few = replace(whole, start=replace(whole.start, used=used))
+    few = replace(whole, state=replace(whole.state, used=used))
     assert advice(few, 'view_1.jpg: fewer than 6 targets') != []
 
 
 def test_photographs_that_are_not_rolled_are_named() -> None:
     whole = solution()
     assert advice(whole, 'rolled') == []
-    rotations = whole.start.rotations[::2]
+    rotations = whole.state.rotations[::2]
     assert len(rotations) == 3
     upright = np.repeat(rotations, 2, axis=0)
-    same = replace(whole, start=replace(whole.start, rotations=upright))
+    same = replace(whole, state=replace(whole.state, rotations=upright))
     assert advice(same, 'no photograph is rolled') != []
     (view,) = whole.network.cameras
     fixed = replace(same.network, cameras=(replace(view, fixed=True),))
@@ -104,7 +104,7 @@ def test_deviations_are_computed_minus_known() -> None:
     assert (used.bar.check, check.bar.check) == (False, True)
     # By sampling from the covariance of the two ends.
     source = np.random.default_rng(5)
-    ends = np.concatenate((whole.start.points[2], whole.start.points[3]))
+    ends = np.concatenate((whole.state.points[2], whole.state.points[3]))
     samples = source.multivariate_normal(ends, whole.covariance_of_points[6:12, 6:12], 100_000)
     lengths = np.linalg.norm(samples[:, :3] - samples[:, 3:], axis=1)
     assert check.sigma == pytest.approx(np.hypot(lengths.std(), 0.05), rel=0.01)
@@ -118,16 +118,16 @@ def test_deviations_are_computed_minus_known() -> None:
 def test_there_are_no_deviations_without_scale_or_ends() -> None:
     whole = replace(solution(), network=known(solution().network))
     assert bar_deviations(replace(whole, network=replace(whole.network, unit=''))) == []
-    points = whole.start.points.copy()
+    points = whole.state.points.copy()
     points[[0, 4]] = np.nan
-    part = replace(whole, start=replace(whole.start, points=points))
+    part = replace(whole, state=replace(whole.state, points=points))
     assert [it.bar.ends for it in bar_deviations(part)] == [('3', '4')]
     assert [it.point.name for it in control_deviations(part)] == ['6']
 
 
 def test_cameras_that_are_weak_alike_are_named_together() -> None:
     whole = solution()
-    network, start = whole.network, whole.start
+    network, start = whole.network, whole.state
     names = 'EOS R5', 'B', 'C', 'D', 'E', 'F'
     several = replace(
         whole,
@@ -136,7 +136,7 @@ def test_cameras_that_are_weak_alike_are_named_together() -> None:
             cameras=tuple(replace(network.cameras[0], name=name) for name in names),
             camera_of=np.arange(6),
         ),
-        start=replace(start, calibrations=np.tile(start.calibrations, (6, 1))),
+        state=replace(start, calibrations=np.tile(start.calibrations, (6, 1))),
     )
     (unrolled,) = advice(several, 'rolled by 90 degrees')
     assert unrolled.startswith('Cameras EOS R5, B, C and 3 more: no photograph is rolled')

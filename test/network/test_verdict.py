@@ -38,7 +38,7 @@ def test_a_good_measurement_is_good() -> None:
     whole = good()
     found = verdict(whole)
     extent = max(
-        float(np.linalg.norm(a - b)) for a in whole.start.points for b in whole.start.points
+        float(np.linalg.norm(a - b)) for a in whole.state.points for b in whole.state.points
     )
     sigma = np.sqrt(np.diag(whole.covariance_of_points).mean())
     assert relative_precision(whole) == pytest.approx(extent / sigma)
@@ -116,7 +116,7 @@ def test_a_board_of_exact_points_needs_no_rays_and_no_checks() -> None:
     exact = replace(
         whole,
         network=replace(whole.network, bars=(), control=()),
-        start=replace(whole.start, used=used),
+        state=replace(whole.state, used=used),
         covariance_of_points=np.zeros_like(whole.covariance_of_points),
     )
     found = verdict(exact)

@@ -44,7 +44,7 @@ class Seen(NamedTuple):
 def lens_of(solution: Solution, camera: int, *, square: bool = False) -> Lens:
     """Return the lens of a camera without shear; if `square`, with one focal length."""
     names = parameters_of(solution.network.cameras[camera])
-    value = dict(zip(names, solution.start.calibrations[camera].tolist(), strict=True))
+    value = dict(zip(names, solution.state.calibrations[camera].tolist(), strict=True))
     fx, fy = value['f'] * (1 + value['affinity']), value['f']
     if square:
         fx = fy = (fx + fy) / 2
@@ -58,7 +58,7 @@ def lens_loss(solution: Solution, *, square: bool) -> float:
     """
     largest = 0.0
     for camera in np.flatnonzero(solution.calibrated).tolist():
-        view, calibration = solution.network.cameras[camera], solution.start.calibrations[camera]
+        view, calibration = solution.network.cameras[camera], solution.state.calibrations[camera]
         lens = lens_of(solution, camera, square=square)
         columns, rows = (np.linspace(0, it - 1, _GRID) for it in (view.width, view.height))
         xy = np.stack(np.meshgrid(columns, rows), axis=-1).reshape(-1, 2)
@@ -86,7 +86,7 @@ def determined(solution: Solution) -> list[int]:
 def used_points(solution: Solution) -> Iterator[Seen]:
     """Yield the used image points, those of a target in the order of the photographs."""
     seen = solution.network.observations
-    usable = solution.start.used & solution.determined[seen.point]
+    usable = solution.state.used & solution.determined[seen.point]
     usable &= solution.oriented[seen.photograph]
     order = np.lexsort((seen.photograph, seen.point))
     for row in order[usable[order]].tolist():

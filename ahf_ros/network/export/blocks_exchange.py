@@ -39,7 +39,7 @@ def blocks_exchange_files(solution: Solution) -> dict[str, bytes]:
     for target, seen in by_target(solution).items():
         point = SubElement(points, 'ControlPoint')
         _texts(point, {'Name': solution.network.targets[target], 'Category': 'Full'})
-        _place(SubElement(point, 'Position'), solution.start.points[target])
+        _place(SubElement(point, 'Position'), solution.state.points[target])
         variances = np.diagonal(solution.point_covariances[target])
         horizontal = float(np.sqrt(variances[:2].mean()))
         _texts(
@@ -85,9 +85,9 @@ def _photo(photo: Element, solution: Solution, number: int) -> None:
     _texts(photo, {'Id': str(number), 'ImagePath': file_name(solution, number), 'Component': '1'})
     pose = SubElement(photo, 'Pose')
     rotation = SubElement(pose, 'Rotation')
-    for (row, column), value in np.ndenumerate(solution.start.rotations[number]):
+    for (row, column), value in np.ndenumerate(solution.state.rotations[number]):
         SubElement(rotation, f'M_{row}{column}').text = f'{value:.15g}'
-    _place(SubElement(pose, 'Center'), solution.start.positions[number])
+    _place(SubElement(pose, 'Center'), solution.state.positions[number])
 
 
 def _place(parent: Element, values: np.ndarray) -> None:

@@ -39,7 +39,7 @@ def bundler_files(solution: Solution) -> dict[str, bytes]:
 
     A ValueError names a photograph with a blank in its name, at which readers split.
     """
-    start, network = solution.start, solution.network
+    start, network = solution.state, solution.network
     posed, tracks = oriented(solution), by_target(solution)
     names = [file_name(solution, number) for number in posed]
     if blank := next((name for name in names if len(name.split()) != 1), ''):
@@ -71,7 +71,7 @@ def bundler_files(solution: Solution) -> dict[str, bytes]:
 def _ideal(solution: Solution, seen: Sequence[Seen]) -> FloatArray:
     """Return image points (n, 2) without distortion, px from the middle, y up."""
     cameras = solution.network.camera_of[[it.photograph for it in seen]]
-    calibrations = solution.start.calibrations[cameras]
+    calibrations = solution.state.calibrations[cameras]
     places = undistort(calibrations, np.array([it.xy for it in seen]).reshape(-1, 2))
     return np.asarray(calibrations[:, :1] * places * (1, -1))
 

@@ -151,7 +151,7 @@ def _text(lines: list[str]) -> bytes:
 
 def _points_of_images(solution: Solution) -> list[list[int]]:
     """Return the used observations of each photograph with a pose, in their order."""
-    network, values = solution.network, solution.start
+    network, values = solution.network, solution.state
     lists: list[list[int]] = [[] for _ in network.photographs]
     known = values.used & solution.determined[network.observations.point]
     for row in np.flatnonzero(known):
@@ -178,7 +178,7 @@ def _cameras(solution: Solution) -> list[str]:
 
 def _images(solution: Solution, points_of: list[list[int]]) -> list[str]:
     """Return poses from world to camera, and the image points below each of them."""
-    network, values = solution.network, solution.start
+    network, values = solution.network, solution.state
     lines = ['# IMAGE_ID, QW, QX, QY, QZ, TX, TY, TZ, CAMERA_ID, NAME, then X, Y, POINT3D_ID']
     for index in np.flatnonzero(solution.oriented):
         name = network.photographs[index]
@@ -199,7 +199,7 @@ def _images(solution: Solution, points_of: list[list[int]]) -> list[str]:
 
 def _points(solution: Solution, points_of: list[list[int]]) -> list[str]:
     """Return targets with their mean residual in px and the image points that show them."""
-    network, values = solution.network, solution.start
+    network, values = solution.network, solution.state
     tracks: list[list[tuple[int, int, float]]] = [[] for _ in network.targets]
     for image in np.flatnonzero(solution.oriented):
         for place, row in enumerate(points_of[image]):

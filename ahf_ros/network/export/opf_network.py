@@ -30,7 +30,7 @@ def opf_network_files(solution: Solution) -> dict[str, bytes]:
     """Return a project with calibrated cameras and targets, and what these were measured from."""
     network = solution.network
     points = [
-        {'id': network.targets[target], 'coordinates': solution.start.points[target].tolist()}
+        {'id': network.targets[target], 'coordinates': solution.state.points[target].tolist()}
         for target in by_target(solution)
     ]
     files = {
@@ -163,7 +163,7 @@ def _marks(solution: Solution) -> list[dict[str, Any]]:
 
 
 def _calibrated(solution: Solution) -> dict[str, Any]:
-    start = solution.start
+    start = solution.state
     return {
         'sensors': [
             {'id': camera + 1, 'internals': _internals(solution, camera)}

@@ -62,7 +62,7 @@ def reality_capture_files(solution: Solution) -> dict[str, bytes]:
         for it in used_points(solution)
     ]
     ground = [
-        (network.targets[it], *(f'{value:.12g}' for value in solution.start.points[it]))
+        (network.targets[it], *(f'{value:.12g}' for value in solution.state.points[it]))
         for it in determined(solution)
     ]
     files['control_points.csv'] = csv_table([('#image', 'point', 'x', 'y'), *rows])
@@ -100,7 +100,7 @@ def _xmp(solution: Solution, number: int) -> bytes:
         _tag('rdf', 'Description'),
         {_tag('xcr', name): value for name, value in about.items()},
     )
-    start = solution.start
+    start = solution.state
     coefficients = np.array([lens.k1, lens.k2, lens.k3, 0.0, lens.p2, lens.p1])
     for name, values in (
         ('Rotation', start.rotations[number]),

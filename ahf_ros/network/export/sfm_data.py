@@ -30,7 +30,7 @@ def alicevision_files(solution: Solution) -> dict[str, bytes]:
 
     The IDs of targets are in `landmark_labels`, which AliceVision leaves alone.
     """
-    network, start = solution.network, solution.start
+    network, start = solution.network, solution.state
     views, poses = [], []
     for number in oriented(solution):
         view = network.cameras[network.camera_of[number]]
@@ -124,7 +124,7 @@ def openmvg_files(solution: Solution) -> dict[str, bytes]:
 
     `landmark_labels.json` has the IDs of targets.
     """
-    network, start = solution.network, solution.start
+    network, start = solution.network, solution.state
     posed, tracks = oriented(solution), by_target(solution)
     folders = {str(PurePath(network.photographs[number]).parent) for number in posed}
     root = folders.pop() if len(folders) == 1 else ''

@@ -161,7 +161,7 @@ def _metashape_lens(solution: Solution, index: int) -> dict[str, float]:
     """Return a calibration with the principal point from the middle of the image, px."""
     view = solution.network.cameras[index]
     value = dict(
-        zip(parameters_of(view), solution.start.calibrations[index].tolist(), strict=True)
+        zip(parameters_of(view), solution.state.calibrations[index].tolist(), strict=True)
     )
     f = value['f']
     beside = {'k4': value['k4']} if view.equidistant else {'p1': value['p2'], 'p2': value['p1']}
@@ -179,7 +179,7 @@ def _metashape_lens(solution: Solution, index: int) -> dict[str, float]:
 
 
 def _metashape_cameras(chunk: Element, solution: Solution) -> None:
-    network, values = solution.network, solution.start
+    network, values = solution.network, solution.state
     sensors, cameras = SubElement(chunk, 'sensors'), SubElement(chunk, 'cameras')
     for index, view in enumerate(network.cameras):
         if not solution.calibrated[index]:
@@ -206,7 +206,7 @@ def _metashape_cameras(chunk: Element, solution: Solution) -> None:
 
 
 def _metashape_markers(chunk: Element, solution: Solution) -> None:
-    network, values = solution.network, solution.start
+    network, values = solution.network, solution.state
     points = SubElement(chunk, 'markers')
     frame = SubElement(SubElement(chunk, 'frames'), 'frame', id='0')
     measured = SubElement(frame, 'markers')
@@ -230,7 +230,7 @@ def mmvii_network_files(solution: Solution) -> dict[str, bytes]:
     Points are ground control with the covariance of each; the correlations between points are
     lost. The format cannot hold a quotation mark: a ValueError names what has one.
     """
-    network, values = solution.network, solution.start
+    network, values = solution.network, solution.state
     for text in (*network.photographs, *network.targets, *(it.name for it in network.cameras)):
         if '"' in text or not text.isprintable():
             raise ValueError(f'{text!r} has a quotation mark, accepted is a name without')
@@ -256,7 +256,7 @@ def _calibration_name(index: int) -> str:
 
 def _mmvii_lens(solution: Solution, index: int) -> bytes:
     view = solution.network.cameras[index]
-    value = dict(zip(PARAMETERS, solution.start.calibrations[index].tolist(), strict=True))
+    value = dict(zip(PARAMETERS, solution.state.calibrations[index].tolist(), strict=True))
     content = Element('InternalCalibration')
     SubElement(content, 'Name').text = f'"{_calibration_name(index)}"'
     SubElement(SubElement(content, 'PixelFrame'), 'NbPix').text = f'{view.width} {view.height}'
@@ -290,9 +290,9 @@ def _mmvii_pose(solution: Solution, index: int, image: str) -> bytes:
     SubElement(content, 'NameImage').text = f'"{image}"'
     camera = int(solution.network.camera_of[index])
     SubElement(content, 'NameInternalCalib').text = f'"{_calibration_name(camera)}"'
-    SubElement(content, 'Center').text = _numbers(solution.start.positions[index])
+    SubElement(content, 'Center').text = _numbers(solution.state.positions[index])
     axes = SubElement(content, 'RotMatrix')
-    for name, axis in zip('IJK', solution.start.rotations[index], strict=True):
+    for name, axis in zip('IJK', solution.state.rotations[index], strict=True):
         SubElement(axes, f'Axe{name}').text = _numbers(axis)
     return mmvii_file(content)
 
@@ -318,7 +318,7 @@ def _mmvii_points(solution: Solution) -> bytes:
         covariance = solution.point_covariances[index]
         item = SubElement(measures, 'el')
         SubElement(item, 'Name').text = f'"{solution.network.targets[index]}"'
-        SubElement(item, 'Pt').text = _numbers(solution.start.points[index])
+        SubElement(item, 'Pt').text = _numbers(solution.state.points[index])
         SubElement(item, 'AdditionalInfo').text = '""'
         # Six numbers: the upper triangle, row after row.
         SubElement(item, '__Opt__Sigma2').text = _numbers(covariance[np.triu_indices(3)])

@@ -73,7 +73,7 @@ def write_network(
     backward distortion.
     """
     solution.check_forward()
-    network, values = solution.network, solution.start
+    network, values = solution.network, solution.state
     points, rays = solution.measured_points, rays_of(solution)[solution.determined]
     record = {
         'sigma0': points.sigma0,
@@ -120,7 +120,7 @@ def rejections(solution: Solution) -> list[Rejection]:
 def _cameras(solution: Solution) -> list[dict[str, Any]]:
     cameras = []
     for index in np.flatnonzero(solution.calibrated):
-        view, calibration = solution.network.cameras[index], solution.start.calibrations[index]
+        view, calibration = solution.network.cameras[index], solution.state.calibrations[index]
         value = dict(zip(parameters_of(view), calibration.tolist(), strict=True))
         cameras.append(
             {
@@ -331,7 +331,7 @@ def calibration_files(solution: Solution) -> dict[str, bytes]:
     files = {}
     views = solution.network.cameras
     for index, view in enumerate(views):
-        calibration = solution.start.calibrations[index]
+        calibration = solution.state.calibrations[index]
         if not np.isfinite(calibration).all():
             continue
         stem = 'camera' if len(views) == 1 else f'camera_{index + 1}'
@@ -353,7 +353,7 @@ def tables(solution: Solution) -> dict[str, bytes]:
 
 def _poses(solution: Solution) -> Table:
     """Return poses as ROS has them: the camera's frame in the world, optical axes, x y z w."""
-    network, values = solution.network, solution.start
+    network, values = solution.network, solution.state
     sigmas = [f'sigma_{it}' for it in ('x', 'y', 'z', 'rx', 'ry', 'rz')]
     rows: Table = [['image', 'camera', 'x', 'y', 'z', 'qx', 'qy', 'qz', 'qw', *sigmas]]
     for index in np.flatnonzero(solution.oriented):
@@ -376,7 +376,7 @@ def _residuals(solution: Solution) -> Table:
                 network.targets[point],
                 *(f'{value:.6f}' for value in seen.xy[index]),
                 *(f'{value:.6g}' if np.isfinite(value) else '' for value in numbers),
-                int(solution.start.used[index]),
+                int(solution.state.used[index]),
             ]
         )
     return rows

@@ -32,8 +32,8 @@ def views(solution: Solution) -> list[tuple[str, str]]:
     small beside the network, they are shown alone, too.
     """
     axes, names = axes_of(solution)
-    points = solution.start.points[solution.determined]
-    cameras = solution.start.positions[solution.oriented]
+    points = solution.state.points[solution.determined]
+    cameras = solution.state.positions[solution.oriented]
     whole, alone = _extent(np.concatenate((points, cameras)), axes), _extent(points, axes)
     shown = [('From above', (0, 1), True), ('From the side', (0, 2), True)]
     if alone < _ALONE * whole:
@@ -66,7 +66,7 @@ def image_figure(solution: Solution, photograph: int, enlarged: float) -> str:
     for row in rows:
         x, y = scale * (seen.xy[row] + 0.5)
         residual = solution.residuals[row]
-        kind = 'arrow' if solution.start.used[row] else 'arrow lost'
+        kind = 'arrow' if solution.state.used[row] else 'arrow lost'
         name = escape(network.targets[seen.point[row]])
         if np.isfinite(residual).all():
             dx, dy = scale * enlarged * residual
@@ -80,7 +80,7 @@ def image_figure(solution: Solution, photograph: int, enlarged: float) -> str:
 
 def enlargement(solution: Solution) -> float:
     """Return by how much residuals are enlarged in figures of images: a round number."""
-    lengths = np.linalg.norm(solution.residuals[solution.start.used], axis=1)
+    lengths = np.linalg.norm(solution.residuals[solution.state.used], axis=1)
     width = float(np.median([view.width for view in solution.network.cameras]))
     median = float(np.median(lengths)) if len(lengths) else 0.0
     return round_number(_ARROW * width / median) if median > 0 else 1.0
@@ -93,7 +93,7 @@ def sensor_map(solution: Solution, camera: int, enlarged: float) -> str:
     scale = 1.6 * PICTURE / view.width
     side = view.width / CELLS
     down = max(1, round(view.height / side))
-    rows = solution.start.used & (network.camera_of[seen.photograph] == camera)
+    rows = solution.state.used & (network.camera_of[seen.photograph] == camera)
     column = np.clip((seen.xy[rows, 0] + 0.5) / side, 0, CELLS - 1).astype(int)
     line = np.clip((seen.xy[rows, 1] + 0.5) / view.height * down, 0, down - 1).astype(int)
     cell = line * CELLS + column
@@ -125,10 +125,10 @@ def sensor_map(solution: Solution, camera: int, enlarged: float) -> str:
 
 def axes_of(solution: Solution) -> tuple[FloatArray, tuple[str, str, str]]:
     """Return the directions (3, 3) that figures have to the right, up, and towards the viewer."""
-    points = solution.start.points[solution.determined]
+    points = solution.state.points[solution.determined]
     if solution.network.control or len(points) < 3:
         return np.eye(3), ('x', 'y', 'z')
-    cameras = solution.start.positions[solution.oriented]
+    cameras = solution.state.positions[solution.oriented]
     towards = cameras.mean(axis=0) - points.mean(axis=0) if len(cameras) else np.zeros(3)
     return principal_axes(points, towards), ('length', 'width', 'height')
 
@@ -137,8 +137,8 @@ def _view(solution: Solution, axes: FloatArray, with_cameras: bool) -> tuple[str
     """Return a view along two directions, the step of its grid, and how it enlarges ellipses."""
     known = solution.determined
     posed = solution.oriented & with_cameras
-    points = solution.start.points[known] @ axes.T
-    cameras = solution.start.positions[posed] @ axes.T
+    points = solution.state.points[known] @ axes.T
+    cameras = solution.state.positions[posed] @ axes.T
     low, high = _bounds(np.concatenate((points, cameras)))
     scale = float(np.min((np.array(VIEW) - 2 * _MARGIN) / np.maximum(high - low, 1e-12)))
     middle, step = (low + high) / 2, _step(high - low)
@@ -153,7 +153,7 @@ def _view(solution: Solution, axes: FloatArray, with_cameras: bool) -> tuple[str
     enlarged = round_number(wanted / float(np.median(sizes))) if sizes else 1.0
     parts = list(_grid_lines(step, middle, scale))
     for index, place in zip(np.flatnonzero(posed), placed(cameras), strict=True):
-        forward = solution.start.rotations[index][2] @ axes.T
+        forward = solution.state.rotations[index][2] @ axes.T
         parts.append(_camera(place, forward, solution.network.photographs[index]))
     names = [solution.network.targets[index] for index in np.flatnonzero(known)]
     parts += _knowledge(solution, dict(zip(names, placed(points), strict=True)))

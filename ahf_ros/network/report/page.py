@@ -77,14 +77,14 @@ def _content(solution: Solution) -> dict[str, Any]:
 
 def _targets(solution: Solution) -> list[dict[str, Any]]:
     known, rays = solution.determined, rays_of(solution)
-    angles = largest_angles(solution.network, solution.start)
+    angles = largest_angles(solution.network, solution.state)
     axes = semi_axes(solution)
     sigmas = standard_deviations(solution.covariance_of_points).reshape(-1, 3)
     longest = np.nanmax(axes[:, 0], initial=0) or 1.0
     return [
         {
             'name': solution.network.targets[index],
-            'numbers': (*solution.start.points[index], *sigmas[index], axes[index, 0]),
+            'numbers': (*solution.state.points[index], *sigmas[index], axes[index, 0]),
             'rays': int(rays[index]),
             'few': rays[index] < FEW_RAYS,
             'angle': float(np.degrees(angles[index])),
@@ -101,7 +101,7 @@ def _photographs(solution: Solution) -> list[dict[str, Any]]:
     posed = solution.oriented
     for index, name in enumerate(network.photographs):
         here = seen.photograph == index
-        residuals = solution.residuals[here & solution.start.used]
+        residuals = solution.residuals[here & solution.state.used]
         lengths = np.linalg.norm(residuals, axis=1)
         rows.append(
             {

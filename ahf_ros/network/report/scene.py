@@ -28,15 +28,15 @@ def scene(solution: Solution) -> dict[str, Any]:
     """
     axes, names = axes_of(solution)
     network, known, posed = solution.network, solution.determined, solution.oriented
-    places = solution.start.points[known] @ axes.T
+    places = solution.state.points[known] @ axes.T
     middle = (places.min(axis=0) + places.max(axis=0)) / 2 if len(places) else np.zeros(3)
     extent = float(np.ptp(places, axis=0).max(initial=0)) or 1.0
     largest = CONFIDENCE * semi_axes(solution)[known, 0]
     sizes = largest[largest > 0]
     enlarged = round_number(_ELLIPSOID * extent / float(np.median(sizes))) if len(sizes) else 1.0
     spreads = (CONFIDENCE * enlarged) ** 2 * (axes @ solution.point_covariances[known] @ axes.T)
-    turns = solution.start.rotations[posed]
-    cameras = solution.start.positions[posed] @ axes.T - middle
+    turns = solution.state.rotations[posed]
+    cameras = solution.state.positions[posed] @ axes.T - middle
     directions = np.concatenate((cameras, turns[:, 2] @ axes.T, turns[:, 0] @ axes.T), axis=1)
     targets = [network.targets[index] for index in np.flatnonzero(known)]
     index = {name: place for place, name in enumerate(targets)}

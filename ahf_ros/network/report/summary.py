@@ -48,7 +48,7 @@ def tables(solution: Solution, title: str) -> list[tuple[str, tuple[str, ...], R
 
 def summary(solution: Solution) -> Rows:
     """Return names and values of what describes a whole network."""
-    known, posed, used = solution.determined, solution.oriented, solution.start.used
+    known, posed, used = solution.determined, solution.oriented, solution.state.used
     unit = f' {solution.network.unit}' if solution.network.unit else ', without scale'
     scaled = ', covariances are scaled by its square' if solution.scaled else ''
     rows = [
@@ -64,7 +64,7 @@ def summary(solution: Solution) -> Rows:
         rows.append(('RMS residual x, y', f'{rms[0]:.4f}, {rms[1]:.4f} px'))
     if known.any():
         rays = rays_of(solution)[known]
-        angles = np.degrees(largest_angles(solution.network, solution.start)[known])
+        angles = np.degrees(largest_angles(solution.network, solution.state)[known])
         middle = np.median(rays)
         rows.append(('rays a target', f'{rays.min()} to {rays.max()}, median {middle:g}'))
         between = f'{np.nanmin(angles):.0f} to {np.nanmax(angles):.0f} degrees'
@@ -125,7 +125,7 @@ def camera_rows(solution: Solution, camera: int) -> Rows:
     """
     rows = []
     sigmas = standard_deviations(solution.camera_covariances[camera])
-    values = solution.start.calibrations[camera]
+    values = solution.state.calibrations[camera]
     unknown = undetermined_parameters(solution, camera)
     names = parameters_of(solution.network.cameras[camera])
     for name, value, sigma in zip(names, values, sigmas, strict=True):
