@@ -131,7 +131,6 @@ def decode(
     """
     of_bands = without_outliers(evidence)
     count, angles = of_bands.paper.shape
-    per_sector = angles // family.bits
     cap = _RANKED * of_bands.weight[:, None]
     ranked = np.clip(of_bands.ink - of_bands.paper, -cap, cap)
     ones, pairs = _of_sectors(ranked, overhang, evidence.blur, family)
@@ -140,82 +139,149 @@ def decode(
     decoded = Words.none(count, angles)
     if not read.size:
         return decoded
+    bands = _Bands.of(evidence.select(read), of_bands.select(read), overhang[read], family)
     words, phases = _at_near_phases(words[read], phases[read])
-    some = of_bands.select(read)
-    ends = spread_ends(overhang[read], some.blur, per_sector)
-    order = _clearest(some)
-    turned = replace(
-        some,
-        paper=np.take_along_axis(some.paper, order, 1),
-        ink=np.take_along_axis(some.ink, order, 1),
-        between=np.take_along_axis(some.between, order[:, None], 2),
-    )
-    _, more = _like_paper(some)
-    like_paper = np.take_along_axis(
-        np.maximum(some.paper, _half_paper(evidence.select(read))), order, axis=1
-    )
-    under_paper, on_mark = turned.paper - more[:, None], like_paper - more[:, None]
-    last = some.between.shape[1] + 1
-
-    def explained(words: np.ndarray, phases: np.ndarray) -> tuple[np.ndarray, ...]:
-        """Return what words show, the evidence for them along bands, with covers, and in all."""
-        shown = _steps(words, phases - order[:, :1], ends, some, family)
-        seen = _along_words(turned, shown)
-        marked = (2 * shown > last).transpose(2, 0, 1)
-        as_paper = np.where(marked, on_mark.T[..., None], under_paper.T[..., None])
-        return shown, seen, as_paper, _covered_paths(seen, as_paper, turned)
-
-    steps, evidence_of, as_paper, scores = explained(words, phases)
+    every = bands.explained(words, phases)
     ids = canonical(words, family)[1]
-    likely = scores + prior(words, family, expected)
-    rows, best = np.arange(len(read)), likely.argmax(axis=1)
+    likely = every.scores + prior(words, family, expected)
+    best = likely.argmax(axis=1)
     # What is expected wins a draw, but an ID that is read clearly is no other one.
-    read_as, known_as = (margins(ids, of, best) for of in (scores, likely))
-    margin = np.clip(known_as, read_as, read_as + _DRAW)
-    of_word = evidence_of[:, rows, best], as_paper[:, rows, best]
-    turned_hidden = _hidden(*of_word, scores[rows, best], turned)
-    shown, hidden = np.empty(order.shape, np.uint8), np.empty(order.shape, bool)
-    np.put_along_axis(shown, order, steps[rows, best], axis=1)
-    np.put_along_axis(hidden, order, turned_hidden, axis=1)
-    hidden |= (some.paper == 0) & (some.ink == 0)
-    score = scores[rows, best].astype(np.float64)
-    bare = np.maximum(turned.paper.sum(axis=1), 0)
-    of_best, phase = words[rows, best], phases[rows, best]
-    other, of_other = of_best, score
-    if looks:
-        bits, _ = likeliest_bits(*(of[read, phase % per_sector] for of in (ones, pairs)))
-        # The phases of words begin at any of the sectors.
-        turn = phase[:, None] // per_sector + np.arange(family.bits)
-        other = np.take_along_axis(bits, turn % family.bits, 1) @ (1 << np.arange(family.bits))
-    if (other != of_best).any():
-        of_other = explained(other[:, None], phase[:, None])[-1][:, 0]
+    read_as, known_as = (margins(ids, of, best) for of in (every.scores, likely))
+    rows, of_best = np.arange(len(read)), every.of(best)
+    word, phase = words[rows, best], phases[rows, best]
+    score = of_best.scores.astype(np.float64)
+    turned_hidden = _hidden(of_best.seen, of_best.as_paper, of_best.scores, bands.turned)
+    hidden = bands.in_order(turned_hidden) | ((bands.some.paper == 0) & (bands.some.ink == 0))
+    shown, last = bands.in_order(of_best.steps), bands.last
     inked, mixed = 2 * shown > last, (shown > 0) & (shown < last)
+    other, of_other = word, score
+    if looks:
+        other = _as_it_looks(ones[read], pairs[read], phase, family)
+    if (other != word).any():
+        of_other = bands.explained(other[:, None], phase[:, None]).scores[:, 0]
     coded = beside = np.zeros(len(read))
     if arcs:
-        of_arcs, borders = _free_paths(turned)
-        price = _of_borders(inked, mixed, hidden, borders, _border(turned), family)
-        # Covers may be as long as they like, as arcs may.
+        of_arcs, borders = _free_paths(bands.turned)
+        price = _of_borders(inked, mixed, hidden, borders, _border(bands.turned), family)
         # A first look, which tells whether there is a doubt, knows no lens.
-        ways = [of_word[0], *([_moved(steps[rows, best], turned)] if looks else ())]
-        long = of_word[1] + np.float32(1 - _COVERED / _MORE) * more
-        paths = _covered_paths(np.stack(ways, axis=2), long[..., None], turned)
-        stiff, moved = paths.T.astype(np.float64)[[0, -1]]
+        stiff, moved = bands.under_long_covers(of_best, moved=looks)
         coded, beside = stiff - of_arcs - price, np.maximum(moved - stiff, 0)
     found = Words(
-        words=of_best,
+        words=word,
         starts=2 * np.pi * phase / angles,
-        margin=margin.astype(np.float64),
-        marked=score - bare + some.dot,
+        margin=np.clip(known_as, read_as, read_as + _DRAW).astype(np.float64),
+        marked=score - np.maximum(bands.turned.paper.sum(axis=1), 0) + bands.some.dot,
         coded=coded,
         beside=beside,
         other=other,
         ahead=of_other - score,
         seen=score,
-        typical=_typical(some, inked, hidden),
+        typical=_typical(bands.some, inked, hidden),
         unlike=np.zeros(len(read)),
         hidden=hidden,
     )
     return decoded.replaced(read, found)
+
+
+@dataclass(frozen=True, slots=True)
+class _Explained:
+    """How w words explain k bands, whose angles begin where each band is seen best."""
+
+    steps: np.ndarray  # uint8, (k, w, m), see `_steps`
+    seen: np.ndarray  # (m, k, w), evidence for them along the bands
+    as_paper: np.ndarray  # (m, k, w), where something like paper covers them, less its price
+    scores: np.ndarray  # (k, w), the evidence in all, with the best covers
+
+    def of(self, which: np.ndarray) -> _Explained:
+        """Return one word of each band, by its index, shape (k,), without the axis of words."""
+        rows = np.arange(len(which))
+        return _Explained(
+            self.steps[rows, which],
+            self.seen[:, rows, which],
+            self.as_paper[:, rows, which],
+            self.scores[rows, which],
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class _Bands:
+    """Bands that are decoded, and the same from those angles on at which they are seen best."""
+
+    some: Evidence
+    family: Family
+    ends: tuple[np.ndarray, np.ndarray]  # see `spread_ends`
+    order: np.ndarray  # (k, m), angles of the band at those of `turned`
+    turned: Evidence
+    more: np.ndarray  # (k,), price of each further reading of something that looks like paper
+    under_paper: np.ndarray  # (k, m), evidence for it, less that: on paper, and...
+    on_mark: np.ndarray  # ... on a mark
+
+    @classmethod
+    def of(cls, raw: Evidence, some: Evidence, overhang: np.ndarray, family: Family) -> _Bands:
+        """Return bands, from their evidence with and `without_outliers`."""
+        order = _clearest(some)
+
+        def turned(of: np.ndarray) -> np.ndarray:
+            return np.take_along_axis(of, order, axis=1)
+
+        paper = turned(some.paper)
+        between = np.take_along_axis(some.between, order[:, None], 2)
+        _, more = _like_paper(some)
+        return cls(
+            some=some,
+            family=family,
+            ends=spread_ends(overhang, some.blur, some.paper.shape[1] // family.bits),
+            order=order,
+            turned=replace(some, paper=paper, ink=turned(some.ink), between=between),
+            more=more,
+            under_paper=paper - more[:, None],
+            on_mark=turned(np.maximum(some.paper, _half_paper(raw))) - more[:, None],
+        )
+
+    @property
+    def last(self) -> int:
+        """The step of all ink; see `_steps`."""
+        return self.some.between.shape[1] + 1
+
+    def explained(self, words: np.ndarray, phases: np.ndarray) -> _Explained:
+        """Return how words (k, w) explain the bands at their phases."""
+        steps = _steps(words, phases - self.order[:, :1], self.ends, self.some, self.family)
+        seen = _along_words(self.turned, steps)
+        marked = (2 * steps > self.last).transpose(2, 0, 1)
+        as_paper = np.where(marked, self.on_mark.T[..., None], self.under_paper.T[..., None])
+        return _Explained(steps, seen, as_paper, _covered_paths(seen, as_paper, self.turned))
+
+    def in_order(self, turned: np.ndarray) -> np.ndarray:
+        """Return what is at the angles of `turned`, (k, m), at those of the bands."""
+        found = np.empty(turned.shape, turned.dtype)
+        np.put_along_axis(found, self.order, turned, axis=1)
+        return found
+
+    def under_long_covers(self, of: _Explained, *, moved: bool) -> tuple[np.ndarray, np.ndarray]:
+        """Return the evidence for one word of each band where covers may be as long as arcs, (k,).
+
+        The second is that of bands which may be `moved` beside their dots.
+        """
+        ways = [of.seen, *([_moved(of.steps, self.turned)] if moved else ())]
+        long = of.as_paper + np.float32(1 - _COVERED / _MORE) * self.more
+        paths = _covered_paths(np.stack(ways, axis=2), long[..., None], self.turned)
+        stiff, beside = paths.T.astype(np.float64)[[0, -1]]
+        return stiff, beside
+
+
+def _as_it_looks(
+    ones: np.ndarray, pairs: np.ndarray, phase: np.ndarray, family: Family
+) -> np.ndarray:
+    """Return the words that sectors look like at phases, shape (k,), of any family or of none.
+
+    From the evidence for ones over zeros, and for pairs; see `best_words`.
+    """
+    per_sector = ones.shape[1]
+    rows = np.arange(len(phase))
+    bits, _ = likeliest_bits(*(of[rows, phase % per_sector] for of in (ones, pairs)))
+    # The phases of words begin at any of the sectors.
+    turn = phase[:, None] // per_sector + np.arange(family.bits)
+    return np.take_along_axis(bits, turn % family.bits, 1) @ (1 << np.arange(family.bits))
 
 
 def without_outliers(evidence: Evidence) -> Evidence:
