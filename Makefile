@@ -1,6 +1,6 @@
 # make demo    one striped image is identified in three ways: a line each, a picture in demo/
 #              DEMO='--light lattice --ambient 0.12' and so on; ahf demo --help lists all options
-# make nodes   ROS 2 from PyPI, and the nodes: ahf_detector, ahf_illumination, ahf_scoreboard
+# make nodes   ROS 2 from PyPI, and the five nodes: ahf_detector, ahf_illumination and others
 # make test    every check: ruff, mypy, the import rules, the site, the tests; then the tests that
 #              need no ROS with the oldest versions and without the processor's vector units
 # make test-colcon  the tests as colcon runs them, for once a week: half an hour

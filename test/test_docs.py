@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from benchmarks.gates import value_of
 from support import ROOT
 
 pytestmark = pytest.mark.lasting
@@ -106,3 +107,26 @@ def test_pages_of_the_site_that_load_from_other_hosts_are_found(tmp_path: Path) 
 
 def test_the_readme_is_short() -> None:
     assert len((ROOT / 'README.md').read_text().splitlines()) <= 130
+
+
+@pytest.mark.parametrize(
+    ('page', 'pattern', 'place'),
+    [
+        (
+            'docs/method.md',
+            r'have a prior of e\^-(\d+)',
+            'families.ring.codewords:_UNEXPECTED',
+        ),
+        ('docs/method.md', r'which is a margin below (\d+)', 'families.ring.decoding:CLEAR'),
+        (
+            'docs/limits.md',
+            r'At most (\d+)\s+complete',
+            'vision.dot_search:MAXIMUM_OUTLINES',
+        ),
+        ('docs/limits.md', r'and (\d+) candidates', 'vision.candidates:MAXIMUM_CANDIDATES'),
+        ('docs/limits.md', r'more than (\d+) dots of the other', 'families.gsi.grouping:FEW'),
+    ],
+)
+def test_numbers_are_those_of_the_code(page: str, pattern: str, place: str) -> None:
+    (found,) = re.findall(pattern, (ROOT / page).read_text())
+    assert float(found) == float(value_of(place))
