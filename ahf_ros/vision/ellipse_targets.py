@@ -3,12 +3,28 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from ahf_ros.base.target import UNDECODED, Target
-from ahf_ros.vision.frame import ellipse_axes
+from ahf_ros.vision.frame import affine_frames, ellipse_axes
+
+_MAXIMUM_MOVE, _MAXIMUM_MOVE_SHARE = 1.0, 0.25  # that a centre is moved: px, or radii of its dot
+
+
+def frames_of(targets: Sequence[Target]) -> np.ndarray:
+    """Return the frames of the ellipses of targets, shape (k, 3, 3)."""
+    columns = [(it.x, it.y, it.semi_major, it.semi_minor, it.angle) for it in targets]
+    return affine_frames(*np.array(columns).reshape(-1, 5).T)
+
+
+def stayed(frames: np.ndarray, start: np.ndarray) -> np.ndarray:
+    """Return which dots are about where they were, (k,), so that they are the same ones."""
+    moved = np.hypot(*(frames[:, :2, 2] - start[:, :2, 2]).T)
+    reach: np.ndarray = np.maximum(_MAXIMUM_MOVE, _MAXIMUM_MOVE_SHARE * ellipse_axes(start)[1])
+    return moved <= reach
 
 
 def ellipse_fields(

@@ -39,7 +39,7 @@ from ahf_ros.vision import frame
 from ahf_ros.vision.candidates import cells_along, find_peaks
 from ahf_ros.vision.dot_search import voted_dots, whole_dots
 from ahf_ros.vision.dots import Dots
-from ahf_ros.vision.ellipse_targets import ellipse_fields, targets_from_frames
+from ahf_ros.vision.ellipse_targets import ellipse_fields, frames_of, stayed, targets_from_frames
 from ahf_ros.vision.image import as_gray, check_image
 from ahf_ros.vision.large_targets import targets_of_octaves
 from ahf_ros.vision.log_edges import LogEdges, edges_in_bands
@@ -66,7 +66,6 @@ _CERTAIN = 0.75  # confidence from which a target is reported
 _SURE_OF_TARGET = 0.9  # probability of a target, from which it is reported without its ID
 _PLAUSIBLE = 0.6  # share of rays that agree, of a target that is measured again
 _SAME_PLACE = 0.5  # distance of two readings of one target, radii
-_MAXIMUM_MOVE, _MAXIMUM_MOVE_SHARE = 1.0, 0.1  # that a centre is moved: px, radii
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,8 +109,7 @@ class CctagDetector(PyramidDetector):
             known = [it for it in targets if it.id != UNDECODED and it.family == family.name]
             if not known:
                 continue
-            columns = [(it.x, it.y, it.semi_major, it.semi_minor, it.angle) for it in known]
-            start = frame.affine_frames(*np.array(columns).T)
+            start = frames_of(known)
             usual = Prior()
             edges = np.array(
                 [(it.edge_shift or 0.0, usual.blur, usual.sharpening) for it in known]
@@ -121,9 +119,7 @@ class CctagDetector(PyramidDetector):
             light = in_light(gray, of, family)
             if light is not gray:
                 of = align(light, start, ids, edges, family)
-            moved = np.hypot(*(of.frames[:, :2, 2] - start[:, :2, 2]).T)
-            reach = np.maximum(_MAXIMUM_MOVE, _MAXIMUM_MOVE_SHARE * frame.mean_radii(start))
-            good = (moved <= reach) & (of.rays >= _PLAUSIBLE)
+            good = stayed(of.frames, start) & (of.rays >= _PLAUSIBLE)
             of = of.replaced(good, jointly(gray, of.select(good), family))
             places = ellipse_fields(of.frames, of.covariance, of.edge_shift)
             refined = moved_targets(refined, known, places, good)

@@ -19,14 +19,13 @@ from ahf_ros.families.dots.discs import judged, small_discs, voted_discs, whole_
 from ahf_ros.families.dots.rings import CERTAIN, Rings, fit_targets, likely_targets, read_discs
 from ahf_ros.families.pyramid_detector import PyramidDetector
 from ahf_ros.prints.dots import DotFamily
-from ahf_ros.vision.ellipse_targets import ellipse_fields
+from ahf_ros.vision.ellipse_targets import ellipse_fields, frames_of, stayed
 from ahf_ros.vision.frame import affine_frames, ellipse_axes
 from ahf_ros.vision.image import as_gray, check_image
 from ahf_ros.vision.large_targets import targets_of_octaves
 from ahf_ros.vision.pyramid import ImagePyramid, Octave
 
 _PLAUSIBLE = 0.5  # share of the edges of disc and border
-_MAXIMUM_MOVE, _MAXIMUM_MOVE_SHARE = 1.0, 0.2  # that a centre is moved: px, radii
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,14 +57,11 @@ class DotsDetector(PyramidDetector):
         dotted = [target for target in targets if isinstance(target, DottedTarget)]
         if not dotted:
             return list(targets)
-        columns = [(it.x, it.y, it.semi_major, it.semi_minor, it.angle) for it in dotted]
-        start = affine_frames(*np.array(columns).T)
+        start = frames_of(dotted)
         polarity = np.array([target.polarity for target in dotted])
         gray = as_gray(image).astype(np.float32, copy=False)
         fit = fit_targets(gray, start, polarity, self.design)
-        moved = np.hypot(*(fit.frames[:, :2, 2] - start[:, :2, 2]).T)
-        reach = np.maximum(_MAXIMUM_MOVE, _MAXIMUM_MOVE_SHARE * ellipse_axes(start)[1])
-        good = (fit.share >= _PLAUSIBLE) & (moved <= reach)
+        good = (fit.share >= _PLAUSIBLE) & stayed(fit.frames, start)
         changes = fit.frames @ np.linalg.inv(start)
         places = [
             {**place, 'dots': _moved(target, change)}

@@ -47,7 +47,7 @@ from ahf_ros.prints.gsi import PointFamily
 from ahf_ros.vision import frame
 from ahf_ros.vision.dot_search import voted_dots, whole_dots
 from ahf_ros.vision.dots import Dots, distinct
-from ahf_ros.vision.ellipse_targets import ellipse_fields, targets_from_frames
+from ahf_ros.vision.ellipse_targets import ellipse_fields, frames_of, stayed, targets_from_frames
 from ahf_ros.vision.homography import local_frames
 from ahf_ros.vision.image import as_gray, check_image
 from ahf_ros.vision.large_targets import targets_of_octaves
@@ -58,7 +58,6 @@ _MARGIN = 0.5  # about the dots of certain targets, dot radii
 _WHOLE_MARGIN = 0.4  # about a dot whose outline is whole, dot radii
 _PROMISING = 0.85  # support of a hypothesis with another code than before, to be placed again
 _MAXIMUM_GROWTH = 1.0  # of ink, beyond which dots are printed with another radius, px
-_MAXIMUM_MOVE = 1.0  # that the reference point is moved by a refinement, px, or dot radii
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,11 +111,7 @@ class GsiDetector(PyramidDetector):
         ellipses = np.array([it.dots for it in dotted])
         frames = frame.affine_frames(*ellipses.reshape(-1, 5).T).reshape(*ellipses.shape[:2], 3, 3)
         placed = place_targets(gray, frames, polarity, *_printed(words, code), code.reach)
-        moved = np.hypot(*(placed.homographies[:, :2, 2] - [(it.x, it.y) for it in dotted]).T)
-        reach = np.maximum(
-            _MAXIMUM_MOVE, _MAXIMUM_MOVE * np.array([it.semi_minor for it in dotted])
-        )
-        good = (moved <= reach) & (placed.share >= 0.5)
+        good = stayed(placed.homographies, frames_of(dotted)) & (placed.share >= 0.5)
         return moved_targets(targets, dotted, _fields(placed, words, code), good)
 
 

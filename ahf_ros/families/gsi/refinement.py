@@ -13,6 +13,7 @@ import numpy as np
 from ahf_ros.vision.black import black_lift
 from ahf_ros.vision.circle_fit import ENOUGH, dot_circles, fit_circles_of_any_blur
 from ahf_ros.vision.dots import Dots
+from ahf_ros.vision.ellipse_targets import stayed
 from ahf_ros.vision.frame import ellipse_axes, mean_radii, project
 from ahf_ros.vision.homography import fit_homographies, local_frames
 from ahf_ros.vision.robust import median
@@ -21,7 +22,6 @@ from ahf_ros.vision.sampling import sample_circles
 _RAYS = 32  # about a dot
 _SIZES, _REACHES = np.array([0.5, 1.1, 2.3]), np.array([1.9, 0.95, 0.45])
 # Semi-minor axis of a dot, px, from where on its edge is looked for within a reach, dot radii.
-_MAXIMUM_MOVE, _MAXIMUM_MOVE_SHARE = 0.8, 0.25  # that the centre of a dot is moved: px, radii
 _UNMEASURED = 0.3  # standard deviation of a centre whose edge was not fitted, px
 _OUTLIER = 4.0  # standard deviations from which a dot loses its weight
 _MINIMUM_ERROR = 0.01  # of a centre, standard deviation, that edges of light cannot undercut, px
@@ -99,11 +99,10 @@ def measure_dots(gray: np.ndarray, frames: np.ndarray, polarity: np.ndarray) -> 
     reach = _REACHES[np.searchsorted(_SIZES, minor[which], 'right') - 1, None]
     circles = dot_circles(polarity[which], _RAYS)
     fit = fit_circles_of_any_blur(gray, frames[which], circles, reach=reach, projective=False)
-    moved = np.hypot(*(fit.frames[:, :2, 2] - frames[which, :2, 2]).T)
     good = fit.share >= ENOUGH
     found[which], fitted[which[good]] = good, fit.frames[good]
     growth[which] = fit.growth
-    good &= moved <= np.maximum(_MAXIMUM_MOVE, _MAXIMUM_MOVE_SHARE * minor[which])
+    good &= stayed(fit.frames, frames[which])
     near[which] = good
     covariance[which[good]] = fit.covariance[good] + _MINIMUM_ERROR**2 * np.eye(2)
     return MeasuredDots(

@@ -21,10 +21,8 @@ from ahf_ros.families.ring.reading import read_bands
 from ahf_ros.prints.ring import Family, canonical
 from ahf_ros.vision import frame
 from ahf_ros.vision.circle_fit import ENOUGH, Fit, fit_dots
-from ahf_ros.vision.ellipse_targets import ellipse_fields
+from ahf_ros.vision.ellipse_targets import ellipse_fields, frames_of, stayed
 from ahf_ros.vision.image import as_gray, check_image
-
-_MAXIMUM_MOVE, _MAXIMUM_MOVE_SHARE = 1.0, 0.2  # that a centre is moved: px, or radii of its dot
 
 
 def refine_centres(
@@ -58,12 +56,9 @@ def refine_centres(
     if not targets:
         return []
     gray = as_gray(image).astype(np.float32, copy=False)
-    columns = [(it.x, it.y, it.semi_major, it.semi_minor, it.angle) for it in targets]
-    start = frame.affine_frames(*np.array(columns).T)
+    start = frames_of(targets)
     located = _locate(gray, start, targets, families, polarities, expected)
-    moved = np.hypot(*(located.frames[:, :2, 2] - start[:, :2, 2]).T)
-    reach = np.maximum(_MAXIMUM_MOVE, _MAXIMUM_MOVE_SHARE * frame.ellipse_axes(start)[1])
-    good = (located.share >= ENOUGH) & (moved <= reach)
+    good = (located.share >= ENOUGH) & stayed(located.frames, start)
     places = ellipse_fields(located.frames, located.covariance, located.print_growth)
     return [
         replace(target, **place) if is_good else target
