@@ -46,7 +46,6 @@ _UNEVEN = 0.011  # usual error of slopes where light is no slope within a profil
 # the seeds 1 to 3, by maximum likelihood.
 _OF_LIGHT, _EVEN = 78.0, 0.0085
 _LONG = 6.0  # radius of dots, px, from which profiles are long enough for slopes to tell of light
-_SYSTEMATIC = 0.001  # standard deviation of what pixels and interpolation do to a centre, px
 _PRIOR_SCALE = 0.003  # standard deviation of the printed proportions of circles and dot
 _PRIOR_LIT_SCALE = 0.02  # the same as uneven light shows them
 _PRIOR_PERSPECTIVE = 0.02  # of the projective part, in 1 a dot radius
@@ -214,7 +213,6 @@ def fit_circles(
     covariance = np.full((len(frames), 2, 2), np.nan)
     if covariances:
         covariance = _covariance(fit, frames, circles, projective)
-    affine = frame.local_affine(moved)
     return Fit(
         frames=moved,
         polarity=circles.polarity[:, 0],
@@ -222,7 +220,7 @@ def fit_circles(
         bright=median(np.maximum(edges.bright, 0), seen),
         share=np.min(shares, axis=0),
         deviation=np.sqrt(squares.sum(axis=1) / np.maximum(count, 1)),
-        covariance=affine @ covariance @ affine.transpose(0, 2, 1) + _SYSTEMATIC**2 * np.eye(2),
+        covariance=frame.centre_covariance(moved, covariance),
         blur=blur,
         edge_shift=fit.unknowns[:, -1] if projective else np.zeros(len(frames)),
         proportion=1 + fit.unknowns[:, 7] if projective else np.ones(len(frames)),
@@ -280,13 +278,13 @@ def _covariance(
     used = geman_mcclure(of.own.weights, of.relative)
     common = common_errors(used * of.errors * edges.scale, circles.line)
     covariance = edge_covariance(parts, used, edges.spacing, of.normal.shape[1], common)
+    short = np.minimum(frame.mean_radii(frames) / _LONG, 1) ** 2
     if projective:
         dot = circles.group == 0
         uneven = unevenness(of.light.errors[:, dot], used[:, dot])
-        short = np.minimum(frame.mean_radii(frames) / _LONG, 1) ** 2
         variance = _OF_LIGHT * (uneven + _EVEN) * short
     else:
-        variance = 1 + np.minimum((unevenness(of.light.errors, used) / _UNEVEN) ** 2, 1)
+        variance = 1 + short * np.minimum((unevenness(of.light.errors, used) / _UNEVEN) ** 2, 1)
     return np.asarray(covariance * variance[:, None, None])
 
 

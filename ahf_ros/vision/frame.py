@@ -15,9 +15,10 @@ from __future__ import annotations
 
 import numpy as np
 
-SYSTEMATIC = 0.003
-"""Standard deviation of the effects of lens distortion and pixels on a centre, px."""
-
+# Standard deviation of what pixels and interpolation do to a centre, px. With 0, 0.001, 0.002 and
+# 0.003 px, e' C^-1 e of 374 square markers in rendered scenes is 2.4, 2.1, 1.6 and 1.3 on average,
+# of 57 CCTags 2.3, 2.1, 1.8 and 1.4.
+_SYSTEMATIC = 0.001
 _CORNERS = 32  # of the polygon of an outline
 
 # The changes of `changed` that circles show: none of them turns the plane.
@@ -189,10 +190,10 @@ def local_affine(frames: np.ndarray) -> np.ndarray:
 def centre_covariance(frames: np.ndarray, covariance: np.ndarray) -> np.ndarray:
     """Return the covariances of the images of centres, (k, 2, 2), px^2, from those in the plane.
 
-    Lens distortion and pixels add their own.
+    Pixels and interpolation add their own.
     """
     affine = local_affine(frames)
-    return affine @ covariance @ affine.transpose(0, 2, 1) + SYSTEMATIC**2 * np.eye(2)
+    return affine @ covariance @ affine.transpose(0, 2, 1) + _SYSTEMATIC**2 * np.eye(2)
 
 
 def nearest(frames: np.ndarray, others: np.ndarray, count: int) -> np.ndarray:

@@ -44,7 +44,6 @@ _TRIALS = 4
 _DAMPING = 1e-3, 1e-4  # at first, and at least
 _STAYING, _BY_PLACE = 1e-3, 10.0  # move of a centre, px, and of edges by that
 _OF_VARIANCE = 1.4  # of gray values, that their model adds
-_SYSTEMATIC = 0.003  # standard deviation of what the model does to a centre, px
 _DIFFERENT = 2.0  # deviations of a print that counts as one
 _MOST_SQUARED = 16.0  # of errors, in their deviations
 _LEAST_SPREAD_OF_MISFITS = 0.2  # of their logarithms
@@ -75,9 +74,8 @@ class Fit:
     @property
     def of_centre(self) -> np.ndarray:
         """Covariance of the centre, px^2, (2, 2)."""
-        affine = frame.local_affine(self.formed.frame)
-        covariance = _OF_VARIANCE * affine @ self.covariance[:2, :2] @ affine.T
-        return covariance + _SYSTEMATIC**2 * np.eye(2)
+        in_plane = _OF_VARIANCE * self.covariance[None, :2, :2]
+        return frame.centre_covariance(self.formed.frame[None], in_plane)[0]
 
     def misfit(self, usual: Usual) -> float:
         """Return the mean of squares of errors in their deviations, of which none counts much."""

@@ -70,7 +70,6 @@ _SHARPENINGS = 0.0, 4.0  # amounts of it
 _HELD = 1e9  # weight of a bound
 _MOST_OF_EDGES = 0.3, 0.3, 1.0  # change of shift, ln of the blur and sharpening in a round
 _INDEPENDENT = 0.3  # distance of independent readings along a profile, px
-_SYSTEMATIC = 0.004  # standard deviation of what pixels and interpolation do to a centre, px
 _CLEAREST = 0.2  # share of rays
 _AGREEING = 0.5  # share of what a ray shows, that the rings explain
 _OF_TARGET = np.array([-14.1, -1.5, 3.0, -1.0, 1.0])  # of one, and of what follows
@@ -475,9 +474,7 @@ def _aligned(
             blur * np.exp(change[:, 8]), _SHARPEST, np.maximum(_SOFTEST * narrow, _SHARPEST)
         )
         sharpening = np.clip(sharpening + change[:, 9], *_SHARPENINGS)
-    covariance = np.linalg.inv(normal)[:, :2, :2]
-    affine = frame.local_affine(frames)
-    covariance = affine @ covariance @ affine.transpose(0, 2, 1) + _SYSTEMATIC**2 * np.eye(2)
+    covariance = frame.centre_covariance(frames, np.linalg.inv(normal)[:, :2, :2])
     seen = lit(gray, frames, lights)
     size = frame.mean_radii(frames)
     ink = rings_along(family, ids, size, shift, blur, sharpening)[0]

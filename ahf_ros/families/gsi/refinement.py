@@ -24,7 +24,6 @@ _SIZES, _REACHES = np.array([0.5, 1.1, 2.3]), np.array([1.9, 0.95, 0.45])
 # Semi-minor axis of a dot, px, from where on its edge is looked for within a reach, dot radii.
 _UNMEASURED = 0.3  # standard deviation of a centre whose edge was not fitted, px
 _OUTLIER = 4.0  # standard deviations from which a dot loses its weight
-_MINIMUM_ERROR = 0.01  # of a centre, standard deviation, that edges of light cannot undercut, px
 _USUAL = (0.08, 0.004)  # distance of a dot from the homography, px and dot radii
 _ROUNDS = 4
 _LEVEL_ANGLES = 2 * np.pi * np.arange(8) / 8
@@ -104,7 +103,7 @@ def measure_dots(gray: np.ndarray, frames: np.ndarray, polarity: np.ndarray) -> 
     growth[which] = fit.growth
     good &= stayed(fit.frames, frames[which])
     near[which] = good
-    covariance[which[good]] = fit.covariance[good] + _MINIMUM_ERROR**2 * np.eye(2)
+    covariance[which[good]] = fit.covariance[good]
     return MeasuredDots(
         frames=fitted, covariance=covariance, found=found, near=near, growth=growth
     )
