@@ -17,9 +17,10 @@ from ahf_ros.base.target import Target, TrueTarget
 from ahf_ros.identification.session import identify
 from ahf_ros.prints.families import AUTO, FAMILY_NAMES, print_in
 from ahf_ros.scenes.evaluation import score, total
-from ahf_ros.scenes.patterns import LIGHT_NAMES, benchmark_lights
+from ahf_ros.scenes.patterns import LIGHT_NAMES
 from ahf_ros.scenes.scene import SceneSettings, render
 from benchmarks import report
+from support.pictures.lights import LIT
 
 RADII = {'gsi': 4.0, 'cctag': 24.0}
 """Of dots, px, of kinds for which 12 px is not usual; CCTags have no dot, but an outer circle."""
@@ -42,7 +43,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     made.add_argument('--lights', nargs='+', choices=LIGHT_NAMES, default=LIGHT_NAMES)
     made.add_argument('--targets', type=int, default=12, help='of a scene')
     options = report.parsed(made, arguments)
-    lights = [of for of in benchmark_lights() if of[0] in options.lights]
+    lights = [of for of in LIT if of[0] in options.lights]
     spacious, rows = max(1.0, (options.targets / 12) ** 0.5), []
     print(*report.table(('', 'light', 'named', AUTO, 'apart (px)'), ()), sep='\n', flush=True)
     for name, (light, ambient) in report.progress([*product(options.families, lights)], 'scenes'):

@@ -19,10 +19,10 @@ import numpy as np
 from ahf_ros.families.contract import DetectorSettings
 from ahf_ros.families.ring.counting import estimate_count
 from ahf_ros.families.ring.detector import RingDetector
-from ahf_ros.scenes.patterns import benchmark_lights
 from ahf_ros.scenes.scene import SceneSettings, render
 from benchmarks import report
 from benchmarks.report import number, table
+from support.pictures.lights import LIT
 
 EMPTY = (('normal', 0.3), ('stripe', 0.3), ('stripe', 0.04), ('lattice', 0.3), ('lattice', 0.04))
 """Lights on walls without targets."""
@@ -36,7 +36,7 @@ def counted(seeds: Sequence[int]) -> list[str]:
     rows, errors = [], []
     ratios: list[float] = []
     usual, empty = SceneSettings(), SceneSettings(targets=0, distractors=DISTRACTORS)
-    cases = [(usual, *light) for light in benchmark_lights()]
+    cases = [(usual, *light) for light in LIT]
     cases += [(empty, *light) for light in EMPTY]
     for kind, light, ambient in report.progress(cases, 'scenes'):
         scene = replace(kind, light=light, ambient=ambient)

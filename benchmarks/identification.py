@@ -28,12 +28,13 @@ from ahf_ros.families import DETECTOR_NAMES, DetectorSettings, create_detector
 from ahf_ros.files.image_files import read_image
 from ahf_ros.files.truth_files import read_truth
 from ahf_ros.prints.ring import FAMILY_NAMES
-from ahf_ros.scenes.patterns import LIGHT_NAMES, benchmark_lights
+from ahf_ros.scenes.patterns import LIGHT_NAMES
 from ahf_ros.scenes.scene import SceneSettings
 from benchmarks import comparison, report
 from benchmarks.report import number
 from benchmarks.rows import Case, Identify, Row, Seen, detector, measured, rendered
 from support import PHOTOS
+from support.pictures.lights import EVERY_LIGHT, LIT
 
 PATIENCE = 600.0
 """Longest time for one image, s, of a command."""
@@ -46,7 +47,7 @@ GROUPS = ('light', 'family', 'polarity', 'tilt', 'radius', 'no targets', 'photog
 def scenes(options: argparse.Namespace) -> Iterator[tuple[str, str, SceneSettings]]:
     """Yield group, name and scene of every row that is asked for."""
     base = SceneSettings(**QUICK) if options.quick else SceneSettings()
-    for light, ambient in benchmark_lights():
+    for light, ambient in LIT:
         yield 'light', f'{light} {ambient:g}', replace(base, light=light, ambient=ambient)
     for family in FAMILY_NAMES[1:]:
         yield 'family', f'{family} normal', replace(base, family=family)
@@ -130,7 +131,7 @@ def parser() -> argparse.ArgumentParser:
     method.add_argument('--command', help='another program; {image}, {family}, {expected}')
     made.add_argument('--ahf', action='store_true', help='search for filters, N being given')
     made.add_argument('--quick', action='store_true', help='small images with six targets')
-    made.add_argument('--lights', nargs='+', choices=LIGHT_NAMES, default=LIGHT_NAMES)
+    made.add_argument('--lights', nargs='+', choices=LIGHT_NAMES, default=EVERY_LIGHT)
     made.add_argument('--groups', nargs='+', choices=GROUPS, default=GROUPS)
     made.add_argument(
         '--compare', type=Path, metavar='FILE', help='an earlier JSON object to show beside'

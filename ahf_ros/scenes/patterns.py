@@ -148,12 +148,6 @@ def turned(pattern: Pattern, scale: float, turn: float) -> Pattern:
     return lambda u, v: pattern(u * along + v * across, v * along - u * across)
 
 
-def benchmark_lights() -> tuple[tuple[str, float], ...]:
-    """Return the lights of the benchmarks as (name, ambient light) pairs."""
-    patterned = ((name, ambient) for name in LIGHT_NAMES[1:] for ambient in (0.3, 0.12, 0.04))
-    return (('normal', 0.3), *patterned)
-
-
 def _wave(
     generator: np.random.Generator, period: float, direction: float, shift: float
 ) -> tuple[np.float32, np.float32, np.float32]:

@@ -21,12 +21,12 @@ from ahf_ros.families import DetectorSettings
 from ahf_ros.prints import RING_NAMES
 from ahf_ros.prints.ring import FAMILY_NAMES, family, ring_family
 from ahf_ros.scenes.bent.picture import render_bent
-from ahf_ros.scenes.patterns import LIGHT_NAMES, benchmark_lights
 from ahf_ros.scenes.scene import SceneSettings, render
 from support.pictures import bent, occluders
 from support.pictures.disturbed import blurred, compressed, noisy, overlapping
 from support.pictures.drawn_families import LIGHTS, TARGETS, random_family, sheet
 from support.pictures.exposure import Exposure
+from support.pictures.lights import EVERY_LIGHT, LIT, PATTERNS
 from support.pictures.lookalikes import LOOKALIKES
 from support.pictures.phone import phone
 from support.pictures.sheets import COLUMNS, ROWS, mark_sheet, random_numbers, target_sheet
@@ -114,10 +114,10 @@ def scenes(seed: int) -> Iterator[Scene]:
 
 def lit(seed: int) -> Iterator[SceneSettings]:
     """Yield scenes under all lights as in the figures, and smaller ones in deeper shadow."""
-    for light, ambient in benchmark_lights():
+    for light, ambient in LIT:
         yield SceneSettings(light=light, ambient=ambient, seed=seed)
     generator = np.random.default_rng(seed)
-    for light, ambient in product(LIGHT_NAMES[1:], SHADOWS):
+    for light, ambient in product(PATTERNS, SHADOWS):
         radius = float(generator.choice([9, 14, 20, 24]))
         yield SceneSettings(
             width=2000,
@@ -182,7 +182,7 @@ def strange_in_light(seed: int) -> Iterator[Scene]:
     for settings in _small_dots(seed, 24, generator):
         name = _other_print(settings.family, generator)
         yield Scene('other family', render(settings).image, (), name)
-    for light in LIGHT_NAMES:
+    for light in EVERY_LIGHT:
         scale = float(generator.choice([0.3, 0.5, 0.8]))
         settings = SceneSettings(
             width=WIDTH,
@@ -201,7 +201,7 @@ def _small_dots(
     seed: int, targets: int, generator: np.random.Generator, *, varied: bool = False
 ) -> Iterator[SceneSettings]:
     """Yield scenes of small dots under all lights, also of other colours and blurs if `varied`."""
-    for light, ambient in product(LIGHT_NAMES, SHADES):
+    for light, ambient in product(EVERY_LIGHT, SHADES):
         settings = SceneSettings(
             width=WIDTH,
             height=HEIGHT,

@@ -13,8 +13,8 @@ import numpy as np
 from ahf_ros.base.target import DottedTarget
 from ahf_ros.families import create_detector
 from ahf_ros.prints.gsi import GSI_LIBRARY, point_family
-from ahf_ros.scenes.patterns import LIGHT_NAMES
 from ahf_ros.scenes.scene import Rendering, SceneSettings
+from support.pictures.lights import EVERY_LIGHT, PATTERNS
 
 GSI = SceneSettings(
     family='gsi', width=1600, height=1200, targets=6, dot_radius=5.0, focal_length=6.0
@@ -56,7 +56,7 @@ def gsi_scenes(seed: int, folder: Path) -> Iterator[tuple[str, SceneSettings]]:
         pixels = scene.dot_radius * radius / point_family().dot_radius
         return replace(scene, family_file=design(folder, radius), dot_radius=pixels, seed=seed)
 
-    for light, ambient in product(LIGHT_NAMES[1:], (0.3, 0.12, 0.04)):
+    for light, ambient in product(PATTERNS, (0.3, 0.12, 0.04)):
         radius = float(generator.choice([5.0, 6.0, 8.0, 10.0]))
         polarity = str(generator.choice(['dark', 'bright']))
         changes: dict[str, Any] = {'dot_radius': radius, 'polarity': polarity}
@@ -101,7 +101,7 @@ def dots_scenes(seed: int) -> Iterator[tuple[str, SceneSettings]]:
     for width in WIDTHS:
         yield 'size', replace(base, targets=40, dot_radius=width / PER_RADIUS)
     generator = np.random.default_rng(seed)
-    for light, ambient in product(LIGHT_NAMES[1:], AMBIENT):
+    for light, ambient in product(PATTERNS, AMBIENT):
         radius = float(generator.choice([8, 11, 14, 18]))
         colour = str(generator.choice(['dark', 'bright']))
         count = round(3000 / radius**2)
@@ -114,7 +114,7 @@ def dots_scenes(seed: int) -> Iterator[tuple[str, SceneSettings]]:
         yield 'blur', replace(base, blur=blur, dot_radius=radius)
     for electrons, radius in product((1000.0, 300.0, 100.0), (4.5, 9.0)):
         yield 'noise', replace(base, full_well=electrons, dot_radius=radius)
-    for light in LIGHT_NAMES:
+    for light in EVERY_LIGHT:
         marks = replace(base, targets=0, distractors=40, dot_radius=10.0, light=light)
         yield 'no targets', marks
     for family, light in product(('metashape12', 'aicon14'), ('normal', 'stripe', 'lattice')):
