@@ -16,8 +16,8 @@ from ahf_ros.base.settings.parameter import Parameter
 from ahf_ros.nodes.drivers import DRIVERS
 from ahf_ros.nodes.interfaces import NODES
 from ahf_ros.nodes.settings import DetectorNodeSettings, PoseNodeSettings
-from ahf_ros.scenes.patterns import LIGHT_NAMES
 from benchmarks.disturbances import TABLES, Count, markdown
+from support.pictures.lights import EVERY_LIGHT
 
 ROOT = Path(__file__).resolve().parent.parent
 AMBIENT = ('0.3', '0.12', '0.04')
@@ -98,7 +98,7 @@ def lights() -> str:
     """Return what `ring` identifies under every light."""
     figures = read('ring')
     rows: list[tuple[str, ...]] = [('light', *AMBIENT)]
-    for light in LIGHT_NAMES:
+    for light in EVERY_LIGHT:
         cells = [cell(figures.get(('light', f'{light} {ambient}'))) for ambient in AMBIENT]
         rows.append((light, *cells))
     return table(rows)
