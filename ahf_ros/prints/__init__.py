@@ -8,13 +8,13 @@ from string import digits
 RING_FOLDER = Path(__file__).with_name('ring_families')
 """The data files of the families of ring targets."""
 
-
 _VENDORS = 'metashape', 'aicon', 'cct'
 
 
-def _order(name: str) -> tuple[int, int]:
+def _order(name: str) -> tuple[int, str, int, str]:
     vendor = name.rstrip(digits)
-    return _VENDORS.index(vendor), int(name.removeprefix(vendor))
+    known = _VENDORS.index(vendor) if vendor in _VENDORS else len(_VENDORS)
+    return known, vendor, len(name), name
 
 
 RING_NAMES = tuple(sorted((path.stem for path in RING_FOLDER.glob('*.json')), key=_order))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import pickle
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -22,6 +23,25 @@ from ahf_ros.prints.families import (
 )
 from ahf_ros.prints.gsi import GSI_LIBRARY
 from ahf_ros.scenes.scene import SceneSettings
+from support import ROOT
+from support.command_line import python
+
+
+def test_a_family_of_a_new_vendor_is_shipped_as_a_file_alone(tmp_path: Path) -> None:
+    copy = tmp_path / 'ahf_ros'
+    shutil.copytree(ROOT / 'ahf_ros', copy, ignore=shutil.ignore_patterns('__pycache__'))
+    folder = copy / 'prints' / 'ring_families'
+    made = json.loads((folder / 'aicon12.json').read_text()) | {
+        'family': 'strange',
+        'band': [2, 4],
+    }
+    (folder / 'strange.json').write_text(json.dumps(made))
+    says = (
+        f'import sys; sys.path.insert(0, {str(tmp_path)!r}); from ahf_ros.prints import ring; '
+        'print(ring.RING_NAMES[-1], ring.family("strange").band)'
+    )
+    done = python('-c', says)
+    assert done.stdout.split(maxsplit=1) == ['strange', '(2.0, 4.0)\n'], done.stderr
 
 
 def test_families_keep_their_order() -> None:
