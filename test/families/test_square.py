@@ -53,6 +53,13 @@ def test_markers_and_their_physical_centres(detector, family, tilt) -> None:
     assert score(shown, found).rmse[2] < 0.03
 
 
+def test_centres_of_markers_whose_cells_are_wider_than_any_blur(detect) -> None:
+    size = {'width': 1800, 'height': 1400, 'dot_radius': 60.0, 'targets': 4, 'seed': 31}
+    shown = scene(full_well=0.0, **size)
+    errors = score(shown, detect(shown.image)).errors
+    assert np.abs(errors).max() < 0.004  # 0.01 with profiles for more than the largest blur
+
+
 @pytest.mark.parametrize(('gamma', 'low', 'high'), [(1.0, 0.45, 0.65), (2.2, -0.05, 0.05)])
 def test_gamma_is_taken_out_of_the_shift_and_does_not_change_the_size(
     gamma, low, high, detect

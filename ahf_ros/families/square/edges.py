@@ -141,7 +141,7 @@ def _fitted(
     for number in range(_MEASUREMENTS):
         left_out = (grid.group == 0) & (inside_first and number < _INSIDE)
         outlines = replace(grid, polarity=np.where(left_out, 0, expected))
-        used = np.maximum(blur, _WIDE_BLUR * cell) if number < _WIDE else blur
+        used = np.clip(_WIDE_BLUR * cell, blur, BLURS[1]) if number < _WIDE else blur
         fit = fit_edges(gray, frames, outlines, _kind(outlines, cells), used, _REACH / cells)
         edges, own = fit.edges, fit.own
         if number:
