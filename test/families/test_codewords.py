@@ -9,9 +9,9 @@ from ahf_ros.families.ring.codewords import (
     COMPETITORS,
     best_words,
     likeliest_bits,
-    margins,
     prior,
 )
+from ahf_ros.families.words import margins
 from ahf_ros.prints.cyclic import rotated_words
 from ahf_ros.prints.ring import canonical, family, sectors
 

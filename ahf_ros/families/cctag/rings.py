@@ -35,7 +35,7 @@ from ahf_ros.families.cctag.templates import (
     templates,
     two_discs,
 )
-from ahf_ros.families.expected import against
+from ahf_ros.families.words import against
 from ahf_ros.prints.cctag import CircleFamily
 from ahf_ros.vision import frame
 from ahf_ros.vision.array_record import ArrayRecord

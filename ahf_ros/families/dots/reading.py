@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ahf_ros.families.dots.discs import border_steps
-from ahf_ros.families.expected import UNEXPECTED
+from ahf_ros.families.words import UNEXPECTED
 from ahf_ros.prints.cyclic import mirrored_words, rotated_words
 from ahf_ros.prints.dots import DotFamily
 from ahf_ros.vision.array_record import ArrayRecord

@@ -11,8 +11,8 @@ from functools import lru_cache
 
 import numpy as np
 
-from ahf_ros.families.expected import against
 from ahf_ros.families.gsi.grouping import Templates
+from ahf_ros.families.words import against, margins
 from ahf_ros.prints.gsi import PointFamily
 from ahf_ros.vision.array_record import ArrayRecord
 from ahf_ros.vision.black import black_lift, lifted
@@ -292,10 +292,9 @@ def read_codes(
     scores = np.clip(evidence.ratio[:, count:], -_MAXIMUM_AGAINST, _MAXIMUM_OF_DOT) @ incidence.T
     if expected:
         scores = scores - against(family.numbers, expected)
-    rows, best = np.arange(len(scores)), scores.argmax(axis=1)
-    highest = scores[rows, best]
-    scores[rows, best] = highest - _GREATEST_MARGIN
-    margin = highest - scores.max(axis=1)
+    best = scores.argmax(axis=1)
+    each = np.broadcast_to(np.arange(scores.shape[1]), scores.shape)
+    margin = np.minimum(margins(each, scores, best), _GREATEST_MARGIN)
     marked = incidence[best] > 0
     empty = ~marked & ~_covered(marked, scale, family)
     of_dots = np.concatenate([template, np.where(marked, positions, _MAXIMUM_FOR)], axis=1)

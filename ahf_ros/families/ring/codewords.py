@@ -120,18 +120,6 @@ def prior(words: np.ndarray, family: Family, expected: frozenset[int]) -> np.nda
     return np.where(likely, np.float32(0), np.float32(-_UNEXPECTED))
 
 
-def margins(ids: np.ndarray, scores: np.ndarray, best: np.ndarray) -> np.ndarray:
-    """Return the evidence for the best words, indices (k,), over those of other IDs, shape (k,).
-
-    From the IDs of words and the evidence for each, shape (k, c). Where all are rotations of one,
-    other IDs have less evidence than the last of these.
-    """
-    rows = np.arange(len(ids))
-    others = np.where(ids == ids[rows, best][:, None], -np.inf, scores).max(axis=1)
-    others = np.where(np.isfinite(others), others, scores.min(axis=1))
-    return np.asarray(scores[rows, best] - others)
-
-
 @cache
 def _all_rotations(family: Family) -> tuple[np.ndarray, np.ndarray]:
     """Return all rotations of all words, and what they show."""

@@ -13,8 +13,9 @@ from functools import lru_cache
 
 import numpy as np
 
-from ahf_ros.families.ring.codewords import best_words, likeliest_bits, margins, prior
+from ahf_ros.families.ring.codewords import best_words, likeliest_bits, prior
 from ahf_ros.families.ring.likelihood import SURPRISES, Evidence
+from ahf_ros.families.words import margins
 from ahf_ros.prints.ring import Family, canonical
 from ahf_ros.vision.array_record import ArrayRecord
 from ahf_ros.vision.normal import normal_integral

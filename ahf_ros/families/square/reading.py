@@ -17,17 +17,18 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from math import erf, log, sqrt
+from math import log
 
 import cv2
 import numpy as np
 
-from ahf_ros.families.expected import against as of_expected
 from ahf_ros.families.square.frames import side_lengths, square_frames
 from ahf_ros.families.square.shapes import corner_odds, parallel_odds
+from ahf_ros.families.words import against as of_expected
 from ahf_ros.prints.square import borders, corner_counts, words
 from ahf_ros.vision.frame import project
 from ahf_ros.vision.logarithm import LOG_OFFSET
+from ahf_ros.vision.normal import exact_normal_integral
 from ahf_ros.vision.sampling import sample
 
 _IN_CELL = ((0.0, 0.0), (-0.2, -0.2), (-0.2, 0.2), (0.2, -0.2), (0.2, 0.2))
@@ -58,8 +59,6 @@ _POSSIBLE = -12.0  # minimum of these odds where all is as usual but a corner or
 _CLEAR = -6.0  # maximum of the odds of other markers where these odds are low
 _WHOLE = -1.0  # logarithmic odds of the cells of a border, from which it is whole
 _PLAIN = 0.35  # logarithmic odds against a marker, for each edge less than random cells have
-
-_ERF = np.frompyfunc(erf, 1, 1)
 
 MINIMUM_ODDS = 2.2
 """Logarithmic odds of a marker that is reported: nine to one."""
@@ -310,10 +309,7 @@ def _unmixed(values: np.ndarray, corners: np.ndarray, side: int, blurs: np.ndarr
     count = values.shape[1]
     neighbours = np.eye(count, k=1) + np.eye(count, k=-1)
     neighbours[0, 0] = neighbours[-1, -1] = 1
-    across, down = (
-        (1 - _ERF(of / blurs / (2 * sqrt(2))).astype(np.float64)) / 2
-        for of in _cell_sizes(corners, side).T
-    )
+    across, down = (exact_normal_integral(-of / blurs / 2) for of in _cell_sizes(corners, side).T)
     mixed = [
         np.eye(count)
         + np.minimum(of, _MOST_MIXED)[:, None, None] * (neighbours - 2 * np.eye(count))

@@ -1,4 +1,4 @@
-"""IDs that are likely to be there, as evidence before a code word is read."""
+"""Evidence for words: that of IDs before they are read, and of the best over all others."""
 
 from __future__ import annotations
 
@@ -24,3 +24,15 @@ def against(ids: np.ndarray, expected: frozenset[int]) -> np.ndarray:
     if not expected:
         return np.zeros(np.shape(ids))
     return np.where(np.isin(ids, sorted(expected)), 0.0, UNEXPECTED)
+
+
+def margins(ids: np.ndarray, scores: np.ndarray, best: np.ndarray) -> np.ndarray:
+    """Return the evidence for the best words, indices (k,), over those of other IDs, shape (k,).
+
+    From the IDs of words and the evidence for each, shape (k, c). Where all words have one ID,
+    others have less evidence than the last of these.
+    """
+    rows = np.arange(len(ids))
+    others = np.where(ids == ids[rows, best][:, None], -np.inf, scores).max(axis=1)
+    others = np.where(np.isfinite(others), others, scores.min(axis=1))
+    return np.asarray(scores[rows, best] - others)
