@@ -31,6 +31,7 @@ from ahf_ros.families.cctag.rings import (
     in_light,
     show_the_same,
 )
+from ahf_ros.families.claims import owners
 from ahf_ros.families.contract import moved_targets
 from ahf_ros.families.pyramid_detector import PyramidDetector
 from ahf_ros.prints import CCTAG_NAMES
@@ -310,20 +311,15 @@ def _renewed(rings: Aligned, again: Aligned) -> Aligned:
 def _best(rings: Aligned, prior: Prior) -> Aligned:
     """Return the likeliest reading of each place, whose rivals are also those of other IDs."""
     rings = rings.select(rings.of_target >= _POSSIBLE)
-    size = frame.mean_radii(rings.frames)
-    kept: list[int] = []
-    margin = rings.margin.copy()
-    left = np.ones(len(size), bool)
-    for index in np.argsort(prior.cost(rings, size), kind='stable').tolist():
-        if not left[index]:
-            continue
-        near = _near(rings.frames, rings.frames[[index]])[:, 0]
+    cost = prior.cost(rings, frame.mean_radii(rings.frames))
+    rings = rings.select(np.argsort(cost, kind='stable'))
+    near, size = _near(rings.frames, rings.frames), frame.mean_radii(rings.frames)
+    kept, margin = np.flatnonzero(owners(len(size), near.T.__getitem__)), rings.margin.copy()
+    for index in kept.tolist():
         cost = prior.cost(rings, size[index])
-        others = cost[near & (rings.ids != rings.ids[index])] - cost[index]
+        others = cost[near[:, index] & (rings.ids != rings.ids[index])] - cost[index]
         margin[index] = min(margin[index], others.min(initial=np.inf))
-        left &= ~near
-        kept.append(index)
-    return replace(rings, margin=margin).select(np.array(kept, int))
+    return replace(rings, margin=margin).select(kept)
 
 
 def _near(frames: np.ndarray, others: np.ndarray) -> np.ndarray:
