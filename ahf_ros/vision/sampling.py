@@ -53,25 +53,37 @@ def sample_circles(
     parts that stay in the cache. Radii of shape (n,) are the same for all k frames, those of shape
     (k, n) are others for each; with m angles, the values have the shape (k, m, n).
     """
-    directions = np.stack([np.cos(angles), np.sin(angles)])
-    radii = np.broadcast_to(radii, (len(frames), np.shape(radii)[-1])).astype(np.float32)
+    radii = np.broadcast_to(radii, (len(frames), np.shape(radii)[-1]))
     values = np.empty((len(frames), len(angles), radii.shape[1]), image.dtype)
-    affine = bool((frames[:, 2] == (0, 0, 1)).all())
     step = max(1, _REMAP_ROWS // len(angles))
     for start in range(0, len(frames), step):
         part = slice(start, start + step)
-        along = (frames[part, :, :2] @ directions).astype(np.float32)[..., None]
-        centre = frames[part, :, 2].astype(np.float32)[..., None, None]
-        rows = [along[:, row] * radii[part, None] for row in range(2 if affine else 3)]
-        for row, points in enumerate(rows):
-            points += centre[:, row]
-        across, down, *scale = rows
-        for points in (across, down) if scale else ():
-            points /= scale[0]
+        across, down = circle_places(frames[part], angles, radii[part])
         shape = (across.shape[0] * across.shape[1], -1)
         sampled = remapped(image, across.reshape(shape), down.reshape(shape))
         values[part] = sampled.reshape(across.shape)
     return values
+
+
+def circle_places(
+    frames: np.ndarray, angles: np.ndarray, radii: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return x and y of points on concentric circles of targets, float32, (k, m, n) each.
+
+    The arguments are those of `sample_circles`.
+    """
+    directions = np.stack([np.cos(angles), np.sin(angles)])
+    along = (frames[:, :, :2] @ directions).astype(np.float32)[..., None]
+    centre = frames[:, :, 2].astype(np.float32)[..., None, None]
+    radii = np.broadcast_to(radii, (len(frames), np.shape(radii)[-1])).astype(np.float32)
+    affine = bool((frames[:, 2] == (0, 0, 1)).all())
+    rows = [along[:, row] * radii[:, None] for row in range(2 if affine else 3)]
+    for row, points in enumerate(rows):
+        points += centre[:, row]
+    x, y, *scale = rows
+    for points in (x, y) if scale else ():
+        points /= scale[0]
+    return x, y
 
 
 def within(pixels: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:

@@ -18,19 +18,13 @@ import numpy as np
 
 from ahf_ros.base.blas import one_blas_thread
 from ahf_ros.base.target import UNDECODED, Target, sorted_targets
+from ahf_ros.families.cctag.alignment import Aligned, align
 from ahf_ros.families.cctag.glance import LARGEST, Circles, likely_rings
 from ahf_ros.families.cctag.joint import contested, jointly
 from ahf_ros.families.cctag.light import EDGES, Lights, shares_alike
+from ahf_ros.families.cctag.prior import Prior
 from ahf_ros.families.cctag.rays import is_drawing, of_drawing
-from ahf_ros.families.cctag.rings import (
-    Aligned,
-    Prior,
-    align,
-    identify,
-    identify_in,
-    in_light,
-    show_the_same,
-)
+from ahf_ros.families.cctag.reading import identify, in_light, likely_lights, show_the_same
 from ahf_ros.families.claims import owners
 from ahf_ros.families.contract import moved_targets
 from ahf_ros.families.pyramid_detector import PyramidDetector
@@ -67,6 +61,7 @@ _CERTAIN = 0.75  # confidence from which a target is reported
 _SURE_OF_TARGET = 0.9  # probability of a target, from which it is reported without its ID
 _PLAUSIBLE = 0.6  # share of rays that agree, of a target that is measured again
 _SAME_PLACE = 0.5  # distance of two readings of one target, radii
+_OVERLAPPING = 0.7  # distance up to which targets overlap, sums of their radii
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,9 +112,7 @@ class CctagDetector(PyramidDetector):
             )
             ids = np.array([it.id for it in known])
             of = align(gray, start, ids, edges, family)
-            light = in_light(gray, of, family)
-            if light is not gray:
-                of = align(light, start, ids, edges, family)
+            _, of = in_light(gray, of, family)
             good = stayed(of.frames, start) & (of.rays >= _PLAUSIBLE)
             of = of.replaced(good, jointly(gray, of.select(good), family))
             places = ellipse_fields(of.frames, of.covariance, of.edge_shift)
@@ -256,8 +249,7 @@ def _identified(gray: np.ndarray, look: _Look) -> tuple[Aligned, np.ndarray]:
     possible = rings.select(rings.of_target >= _POSSIBLE)
     if not len(possible.ids):
         return possible, gray
-    light = in_light(gray, possible, family)
-    again = align(light, possible.frames, possible.ids, possible.edges, family)
+    light, again = in_light(gray, possible, family)
     likely = again.select(again.of_target >= _SURE_OF_TARGET)
     if not len(likely.ids):
         return possible, gray
@@ -265,16 +257,19 @@ def _identified(gray: np.ndarray, look: _Look) -> tuple[Aligned, np.ndarray]:
     # Where one edge of light leaves no doubt, others are not looked for.
     sure = (possible.confidence >= _SURE) & (again.of_target >= _SURE)
     told = replace(again, margin=possible.margin).select(sure)
-    again = identify(light, frames[_alone(frames, told.frames)], polarity, family, camera)
+    lights = likely_lights(light, frames[_free(frames, told.frames)])
+    again = identify(light, lights, polarity, family, camera)
     rings = _best(_renewed(rings, Aligned.joined([told, again])), camera)
     sure = rings.of_target >= _SURE_OF_TARGET
     prior = look.prior.after(rings.select(sure & (rings.confidence >= _PROBABLE)))
     if prior == camera:
         return rings, light
     rings = _best(rings, prior)
-    certain = rings.select(rings.confidence >= _TELLING)
-    doubtful = np.concatenate([rings.frames, frames])
-    again = _readings(light, doubtful[_alone(doubtful, certain.frames)], polarity, family, prior)
+    certain = rings.confidence >= _TELLING
+    doubtful = rings.frames[~certain]
+    others = lights.select(_free(lights.frames, rings.frames[certain]))
+    lights = Lights.joined([others, likely_lights(light, doubtful)])
+    again = _readings(light, lights, polarity, family, prior)
     rings = _best(_renewed(rings, again), prior)
     return rings, light
 
@@ -286,21 +281,25 @@ def _first_readings(gray: np.ndarray, look: _Look) -> tuple[Aligned, int]:
     a row may be one, the others are texture.
     """
     kind = look.polarity, look.family, look.prior
-    found, count = [identify_in(gray, look.lights, *kind, most=1)], _IN_A_ROW
+    found, count = [identify(gray, look.lights, *kind, most=1)], _IN_A_ROW
     while (found[-1].of_target >= _POSSIBLE).any() and count < len(look.frames):
         some = look.frames[count : count + _IN_A_ROW]
-        found.append(identify(gray, some, *kind, most=1))
+        found.append(identify(gray, likely_lights(gray, some, 1), *kind, most=1))
         count += _IN_A_ROW
     return Aligned.joined(found), count
 
 
 def _readings(
-    gray: np.ndarray, frames: np.ndarray, polarity: int, family: CircleFamily, prior: Prior
+    gray: np.ndarray, lights: Lights, polarity: int, family: CircleFamily, prior: Prior
 ) -> Aligned:
-    """Return readings of targets in light of one edge at the most, of two, and so on."""
-    return Aligned.joined(
-        [identify(gray, frames, polarity, family, prior, most) for most in range(1, EDGES + 1)]
-    )
+    """Return readings of targets in their lights, and of doubtful ones in light of less edges."""
+    found = identify(gray, lights, polarity, family, prior)
+    for most in range(EDGES - 1, 0, -1):
+        certain = found.frames[found.confidence >= _TELLING]
+        more = lights.select((lights.counts > most) & _free(lights.frames, certain))
+        less = likely_lights(gray, more.frames, most)
+        found = Aligned.joined([found, identify(gray, less, polarity, family, prior, most)])
+    return found
 
 
 def _renewed(rings: Aligned, again: Aligned) -> Aligned:
@@ -331,6 +330,13 @@ def _near(frames: np.ndarray, others: np.ndarray) -> np.ndarray:
 def _alone(frames: np.ndarray, others: np.ndarray) -> np.ndarray:
     """Return whether targets, (k, 3, 3), are at the place of no other, (n, 3, 3), shape (k,)."""
     return np.logical_not(_near(frames, others).any(axis=1))
+
+
+def _free(frames: np.ndarray, others: np.ndarray) -> np.ndarray:
+    """Return whether targets, (k, 3, 3), overlap no other, (n, 3, 3), shape (k,)."""
+    away = np.hypot(*(frames[:, None, :2, 2] - others[None, :, :2, 2]).transpose(2, 0, 1))
+    reach = _OVERLAPPING * (frame.mean_radii(frames)[:, None] + frame.mean_radii(others))
+    return np.logical_not((away < reach).any(axis=1))
 
 
 def _together(rings: Aligned) -> Aligned:
@@ -369,7 +375,8 @@ def _owned(gray: np.ndarray, rings: Aligned, polarity: int, family: CircleFamily
     for name in CCTAG_NAMES:
         if name == family.name:
             continue
-        others = _readings(gray, own.frames, polarity, circle_family(name), usual)
+        lights = likely_lights(gray, own.frames)
+        others = identify(gray, lights, polarity, circle_family(name), usual)
         others = others.select(others.of_target >= _CERTAIN)
         near = _near(own.frames, others.frames)
         for row, index in enumerate(doubtful.tolist()):

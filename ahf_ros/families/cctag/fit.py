@@ -12,6 +12,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from ahf_ros.families.cctag.alignment import usual_perspective
 from ahf_ros.families.cctag.patch import (
     BLUR,
     EDGES,
@@ -23,7 +24,7 @@ from ahf_ros.families.cctag.patch import (
     Formed,
     Patch,
 )
-from ahf_ros.families.cctag.rings import Prior, usual_perspective
+from ahf_ros.families.cctag.prior import Prior
 from ahf_ros.vision import frame
 from ahf_ros.vision.robust import NORMAL, geman_mcclure
 
@@ -42,6 +43,7 @@ _OUTLIERS = 16.0, *([6.0] * 11)  # deviations that quarter a weight, in rounds
 _FREE = 10  # pixels more than parameters, at the least
 _TRIALS = 4
 _DAMPING = 1e-3, 1e-4  # at first, and at least
+_CHANGING, _CHANGING_LIGHT = 0.02, 0.05  # the same, and of edges of light, px and radii
 _STAYING, _BY_PLACE = 1e-3, 10.0  # move of a centre, px, and of edges by that
 _OF_VARIANCE = 1.4  # of gray values, that their model adds
 _DIFFERENT = 2.0  # deviations of a print that counts as one
@@ -162,12 +164,15 @@ class Usual:
         return normal, right
 
 
-def fitted(patch: Patch, formed: Formed, usual: Usual) -> Fit:
-    """Return what forms the pixels of a target, from what nearly does."""
+def fitted(patch: Patch, formed: Formed, usual: Usual, most: float = math.inf) -> Fit:
+    """Return what forms the pixels of a target, from what nearly does.
+
+    What costs far more than `most` after a round, or more after another, is not fitted to the end.
+    """
     seen, damping = patch.seen, _DAMPING[0]
     weights = 1 / usual.variances(seen)
-    plain, changes = patch.shown(formed)
-    for outlier in _OUTLIERS:
+    plain, changes = patch.shown(formed), patch.changes(formed)
+    for number, outlier in enumerate(_OUTLIERS):
         paper = _paper(weights, plain, seen)
         errors = seen - paper * plain
         variances = usual.variances(paper * plain)
@@ -183,22 +188,30 @@ def fitted(patch: Patch, formed: Formed, usual: Usual) -> Fit:
         known, towards = usual.prior(patch, formed)
         normal[:-1, :-1] += known
         right[:-1] += towards
-        before = formed, plain, changes
+        before = formed, plain
         for _ in range(_TRIALS):
             change = np.linalg.solve(normal + damping * np.diag(np.diag(normal)), right)[:-1]
             formed = before[0].changed(change, patch.most_shift)
-            plain, changes = patch.shown(formed)
+            plain = patch.shown(formed)
             errors = seen - _paper(weights, plain, seen) * plain
             if float(weights @ errors**2) <= best * (1 + _DAMPING[1]):
                 damping = max(damping / 5, _DAMPING[1])
                 break
             damping = max(10 * damping, _DAMPING[0])
         else:
-            formed, plain, _ = before
+            formed, plain = before
             break
         moved = np.hypot(*(formed.frame - before[0].frame)[:2, 2])
-        if max(moved, *np.abs(change[[SHIFT, BLUR]]) / _BY_PLACE) < _STAYING:
+        moved = max(moved, *np.abs(change[[SHIFT, BLUR]]) / _BY_PLACE)
+        if moved < _STAYING:
             break
+        if most < math.inf:
+            shown = _paper(weights, plain, seen) * plain
+            if Fit(patch, formed, shown, normal).cost(usual) > (most if number else 2 * most):
+                break
+        # The derivatives hardly change where the place does not.
+        if moved > _CHANGING or np.abs(change[EDGES:]).max(initial=0.0) > _CHANGING_LIGHT:
+            changes = patch.changes(formed)
     shown = _paper(weights, plain, seen) * plain
     return Fit(patch, formed, shown, np.linalg.inv(normal)[:-1, :-1])
 

@@ -13,7 +13,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from ahf_ros.families.cctag.rays import ANGLES, PROFILE
+from ahf_ros.families.cctag.rays import PROFILE, RAYS, ray_angles
 from ahf_ros.families.cctag.templates import (
     CLIPPED,
     SIZE_STEP,
@@ -78,7 +78,7 @@ class Circles(ArrayRecord):
         profiles = np.zeros((count, len(_RADII)), np.float32)
         for start in range(0, count, _READ):
             part = slice(start, start + _READ)
-            seen = sample_circles(gray, dots.frames[part], ANGLES[::_EVERY], radii)
+            seen = sample_circles(gray, dots.frames[part], ray_angles(RAYS)[::_EVERY], radii)
             np.maximum(seen, 0, out=seen)
             seen /= np.maximum(seen[..., :own] @ share / share.sum(), 1)[..., None]
             unlike = (seen[..., :own] - seen[..., :own].mean(axis=1, keepdims=True)) ** 2 @ share

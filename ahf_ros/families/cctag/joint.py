@@ -13,10 +13,13 @@ from operator import itemgetter
 
 import numpy as np
 
+from ahf_ros.families.cctag.alignment import Aligned, align
 from ahf_ros.families.cctag.fit import Fit, Usual, fitted
 from ahf_ros.families.cctag.light import EDGES, Lights
+from ahf_ros.families.cctag.likely_ids import likely_ids
 from ahf_ros.families.cctag.patch import Patch
-from ahf_ros.families.cctag.rings import Aligned, Prior, align, likely_ids
+from ahf_ros.families.cctag.prior import Prior
+from ahf_ros.families.cctag.rays import FEW_RAYS
 from ahf_ros.families.cctag.templates import MAXIMUM_SHIFT, signed_circles
 from ahf_ros.prints import CCTAG_NAMES
 from ahf_ros.prints.cctag import CircleFamily, circle_family
@@ -24,7 +27,7 @@ from ahf_ros.vision import frame
 from ahf_ros.vision.image import GAMMA, as_light
 
 _LARGEST = 32.0  # px: rays place the rings of larger targets as well, and much faster
-_TELLING = 16  # targets that tell what is usual
+_TELLING = 12  # targets that tell what is usual
 _LARGER = 0.9  # quantile of errors that tell which model is right
 _FEWEST = 60  # pixels that are fitted
 _UNUSUAL = 2.0  # deviations of a misfit, from which other light and other IDs are tried
@@ -35,6 +38,9 @@ _PROBABLE = 0.75  # probability of a target, from which it is placed
 _POSSIBLE, _MOST = 0.05, 128  # the same, from which it is read again, and number of these
 _RIVALS = 12  # IDs that rays may show
 _ODDS, _LESS = 6.0, 2.0  # ln of the odds of a target that is usual, less by each deviation
+_BEYOND_DOUBT = (
+    200.0  # cost more than that of the likeliest ID, of one that is not fitted to the end
+)
 _OF_MARGIN = 0.1  # share of ln of the odds of IDs, by pixels, that is believed
 
 
@@ -47,7 +53,7 @@ def jointly(gray: np.ndarray, rings: Aligned, family: CircleFamily) -> Aligned:
     if not len(small):
         return rings
     own = rings.select(small)
-    scene = _Scene.of(gray, own, family)
+    scene = _Scene.of(gray, own, np.arange(len(own.ids)), family)
     for row, fit in scene.fits(own).items():
         placed = scene.placed(own.select(slice(row, row + 1)), fit)
         rings = rings.replaced(small[row : row + 1], placed)
@@ -67,7 +73,8 @@ def contested(gray: np.ndarray, rings: Aligned, polarity: int, family: CircleFam
     which = which[np.argsort(-rings.of_target[which], kind='stable')[:_MOST]]
     own = rings.select(which)
     certain = own.confidence >= _CERTAIN
-    scene = _Scene.of(gray, own.select(certain) if enough else own, family)
+    telling = np.flatnonzero(certain | np.logical_not(enough))
+    scene = _Scene.of(gray, own, telling, family)
     for row, fit in scene.fits(own).items():
         reading = own.select(slice(row, row + 1))
         unusual = scene.usual.unusual(fit)
@@ -93,13 +100,14 @@ class _Scene:
     gamma: float
     family: CircleFamily
     usual: Usual
+    begun: dict[int, Fit]  # of some targets, by their rows
 
     @staticmethod
-    def of(gray: np.ndarray, rings: Aligned, family: CircleFamily) -> _Scene:
-        """Return an image with what the likeliest of targets tell, gamma with it."""
-        telling = rings.select(np.argsort(-rings.plain, kind='stable')[:_TELLING])
+    def of(gray: np.ndarray, rings: Aligned, rows: np.ndarray, family: CircleFamily) -> _Scene:
+        """Return an image with what the likeliest of the targets in rows tell, gamma with it."""
+        telling = rows[np.argsort(-rings.plain[rows], kind='stable')[:_TELLING]]
         tried = [
-            _Scene(gray, light, gamma, family, Usual())._told(telling)
+            _Scene(gray, light, gamma, family, Usual(), {})._told(rings, telling)
             for light, gamma in ((gray, 1.0), (as_light(gray), GAMMA))
         ]
         return min(tried, key=itemgetter(1))[0]
@@ -110,7 +118,12 @@ class _Scene:
         Where the pixels are unlike what is usual, light of fewer edges is tried.
         """
         fits: dict[int, Fit] = {}
-        rows, worse = np.arange(len(rings.ids)), self.usual.unusual
+        rings = replace(rings, sharpening=self.usual.camera.sharpening_of(rings))
+        worse = self.usual.unusual
+        for row, begun in self.begun.items():
+            fits[row] = fitted(begun.patch, begun.formed, self.usual)
+        usual = {row for row, fit in fits.items() if worse(fit) <= _UNUSUAL}
+        rows = np.array([row for row in range(len(rings.ids)) if row not in usual], int)
         for most in range(EDGES, 0, -1):
             for row, fit in zip(rows.tolist(), self._fits(rings.select(rows), most), strict=True):
                 if fit and (row not in fits or worse(fit) < worse(fits[row])):
@@ -119,12 +132,13 @@ class _Scene:
             rows = np.array(unusual, int)
         return fits
 
-    def _fits(self, rings: Aligned, most: int = EDGES) -> list[Fit | None]:
+    def _fits(self, rings: Aligned, most: int) -> list[Fit | None]:
         fits: list[Fit | None] = []
-        rings, lights = self._aligned(rings, self.usual.camera, most)
+        lights = Lights.about(self.light, rings.frames, most)
         most_shift = MAXIMUM_SHIFT * self.family.narrow
         for row, circles in enumerate(signed_circles(self.family, rings.ids)):
-            own, light = (rings.select(slice(row, row + 1)), lights.select(slice(row, row + 1)))
+            only = slice(row, row + 1)
+            own, light = rings.select(only), lights.select(only)
             patch = Patch.about(self.gray, own, circles, light, self.gamma, most_shift)
             if len(patch.seen) > _FEWEST:
                 first = self.usual.first(patch.first(own, light))
@@ -160,6 +174,7 @@ class _Scene:
         every = len(self.family.numbers) - 1
         while True:
             best = min(fits, key=lambda it: fits[it].cost(self.usual))
+            most = fits[best].cost(self.usual) + _BEYOND_DOUBT
             flips = [1 << bit for bit in range(every.bit_length())]
             others = [best ^ flip for flip in (*flips, every) if best ^ flip not in fits]
             if not others:
@@ -167,12 +182,12 @@ class _Scene:
             circles = signed_circles(self.family, np.array(others))
             for other, of in zip(others, circles, strict=True):
                 patch = replace(fit.patch, circles=of)
-                fits[other] = fitted(patch, fits[best].formed, self.usual)
+                fits[other] = fitted(patch, fits[best].formed, self.usual, most)
         fit = fits.pop(best)
         rivals = list(fits.values())
         for name in CCTAG_NAMES:
             if name != self.family.name:
-                scene = replace(self, family=circle_family(name))
+                scene = replace(self, family=circle_family(name), begun={})
                 rivals += scene._rivals(rings, polarity, fit).values()
         margin = min(rival.cost(self.usual) for rival in rivals) - fit.cost(self.usual)
         reading = replace(rings, ids=np.array([best]), margin=np.array([_OF_MARGIN * margin]))
@@ -181,30 +196,31 @@ class _Scene:
     def _rivals(self, rings: Aligned, polarity: int, fit: Fit) -> dict[int, Fit]:
         """Return fits of a target, (1,), by the IDs that rays may show besides."""
         lights, camera = Lights.about(self.light, rings.frames), self.usual.camera
-        starts, ids, *_ = likely_ids(self.light, lights, polarity, self.family, camera, _RIVALS)
-        numbers, first = np.unique(ids[0], return_index=True)
-        larger = frame.mean_radii(starts[0, first]) / frame.mean_radii(rings.frames)
+        likely = likely_ids(self.light, lights, polarity, self.family, camera, _RIVALS)
+        numbers, first = np.unique(likely.ids[0], return_index=True)
+        larger = frame.mean_radii(likely.starts[0, first]) / frame.mean_radii(rings.frames)
         begun = frame.scaled(np.repeat(fit.formed.frame[None], len(first), axis=0), larger)
         circles = signed_circles(self.family, numbers)
+        most = fit.cost(self.usual) + _BEYOND_DOUBT
         return {
             number: fitted(
-                replace(fit.patch, circles=of), replace(fit.formed, frame=start), self.usual
+                *(replace(fit.patch, circles=of), replace(fit.formed, frame=start)),
+                *(self.usual, most),
             )
             for number, of, start in zip(numbers.tolist(), circles, begun, strict=True)
         }
 
-    def _told(self, rings: Aligned) -> tuple[_Scene, float]:
-        """Return what targets tell, and the usual error of gray values."""
-        usual = replace(self.usual, camera=Prior().of_camera(self._aligned(rings, Prior())[0]))
+    def _told(self, rings: Aligned, rows: np.ndarray) -> tuple[_Scene, float]:
+        """Return what targets in rows tell, and the usual error of gray values."""
+        telling = rings.select(rows)
+        frames, ids, edges = telling.frames, telling.ids, telling.edges
+        telling = align(self.light, frames, ids, edges, self.family, rays=FEW_RAYS)
+        usual = replace(self.usual, camera=Prior().of_camera(telling))
         scene = replace(self, usual=usual)
-        fits = list(scene.fits(rings).values())
+        fits = scene.fits(telling)
         if not fits:
             return scene, math.inf
-        errors = np.abs(np.concatenate([of.errors for of in fits]))
-        return replace(scene, usual=usual.after(fits)), float(np.quantile(errors, _LARGER))
-
-    def _aligned(self, rings: Aligned, camera: Prior, most: int = EDGES) -> tuple[Aligned, Lights]:
-        """Return rings that are brought onto the image, and the lights about them."""
-        lights = Lights.about(self.light, rings.frames, most)
-        edges, family = rings.edges, self.family
-        return align(self.light, rings.frames, rings.ids, edges, family, camera, lights), lights
+        errors = np.abs(np.concatenate([of.errors for of in fits.values()]))
+        begun = {int(rows[row]): fit for row, fit in fits.items()}
+        scene = replace(scene, usual=usual.after(list(fits.values())), begun=begun)
+        return scene, float(np.quantile(errors, _LARGER))

@@ -16,21 +16,22 @@ from itertools import product
 import numpy as np
 
 from ahf_ros.families.cctag.rays import (
-    ANGLES,
     BLACK,
     PROFILE,
-    WHITE,
+    RAYS,
+    Limits,
     Seen,
     clipped,
+    ray_angles,
 )
 from ahf_ros.families.cctag.templates import less_lines
 from ahf_ros.vision import frame
 from ahf_ros.vision.array_record import ArrayRecord
 from ahf_ros.vision.normal import normal_integral
-from ahf_ros.vision.sampling import sample_circles
+from ahf_ros.vision.sampling import circle_places, sample_circles
 
 _EVERY = 2  # one of so many angles and radii is looked at
-_ANGLES, _RADII = ANGLES[::_EVERY], PROFILE[::_EVERY].astype(np.float32)
+_ANGLES, _RADII = ray_angles(RAYS)[::_EVERY], PROFILE[::_EVERY].astype(np.float32)
 _STEP = float(_RADII[1] - _RADII[0])
 _X, _Y = (np.outer(of(_ANGLES), _RADII).astype(np.float32) for of in (np.cos, np.sin))
 _MOVES = (0, 1, 3, 4)  # of a frame, that change what is on a circle
@@ -46,7 +47,7 @@ _SIZES = 1.1  # ratio of radii that share the edges of a first look
 _SHARPEST_FROM = math.ceil(math.log(_WIDTH / _SHARPEST) / math.log(_SIZES))  # step of radii
 _OFFSETS = np.arange(-1.2, 1.21, 0.1)
 _STRAIGHT, _CURVED, _CURVATURE = 16, 24, 0.7
-_FIRST = 12  # edges that are tried with all others
+_FIRST = 6  # edges that are tried with all others
 _SHOWN = 0.15  # length of an edge that is looked for, of the longest
 _ROUNDS = 4
 _DEVIATIONS = 0.3, 0.3, 0.4, 0.3  # of direction, offset, curvature and ln of width
@@ -57,7 +58,6 @@ _EVIDENCE = 25.0  # twice the ln of the likelihood, that an edge adds
 _LEAST_VARIANCE = 0.003**2
 _OF_CLIPPED = 0.1  # weight of gray values that are clipped
 _MANY = 0.02  # share of gray values, from which it matters that they are clipped
-_INTERPOLATED = 0.58  # distance of what linear interpolation mixes with a quarter each, px
 _BRIGHTEST = 2.0  # gray value, of the mean, that has more weight than others
 
 
@@ -71,18 +71,25 @@ class Lights(ArrayRecord):
     slope: np.ndarray  # (k, n), of what is the same all around, by the radius
     moved: np.ndarray  # (k, 3, 3), frames in the middle of what is the same all around
 
+    @property
+    def counts(self) -> np.ndarray:
+        """Return the numbers of edges, (k,)."""
+        return np.count_nonzero(self.heights[:, 2:], axis=1)
+
     def at(self, frames: np.ndarray, angles: np.ndarray, radii: np.ndarray) -> np.ndarray:
         """Return the light at angles (m,) and radii (n,) of frames, float32, shape (k, m, n)."""
         there = np.linalg.inv(self.frames) @ frames
-        points = frame.project(there, frame.circle_points(angles, radii)).astype(np.float32)
-        x, y = points[:, None, ..., 0], points[:, None, ..., 1]
+        x, y = circle_places(there, angles, radii)
         heights = self.heights.astype(np.float32)[..., None, None]
-        light = heights[:, 0] * x[:, 0] + heights[:, 1] * y[:, 0]
+        light = heights[:, 0] * x + heights[:, 1] * y
         size = frame.mean_radii(self.frames)
         for number in range(self.edges.shape[1]):
-            some = np.flatnonzero(heights[:, 2 + number])
+            some = np.flatnonzero(self.heights[:, 2 + number])
+            if not len(some):
+                continue
             edge = self.edges[some, number : number + 1]
-            step = _steps(edge, x[some], y[some], usual_widths(size[some]))[:, 0]
+            own = some if len(some) < len(x) else slice(None)  # no copy of all
+            step = _steps(edge, x[own, None], y[own, None], usual_widths(size[some]))[:, 0]
             light[some] += heights[some, 2 + number] * step
         slope = _interpolated(self.slope, radii)
         light += _mixed(light, slope, _LENS / size, radii[1] - radii[0])
@@ -130,23 +137,23 @@ class Lights(ArrayRecord):
         return Lights(frames, of_light, edges, slope, frame.moved(frames, changes))
 
 
-def lit(gray: np.ndarray, frames: np.ndarray, lights: Lights) -> Seen:
-    """Return the gray values of rays without their light."""
-    values = np.maximum(sample_circles(gray, frames, ANGLES, PROFILE), BLACK)
-    many = clipped(values).mean(axis=(1, 2)) > _MANY
-    light = lights.at(frames, ANGLES, PROFILE)
-    light *= np.maximum((values / light).mean(axis=2, keepdims=True), 1e-3)
-    lowest, highest = (np.float32(of) / light for of in (BLACK, WHITE))
-    step = frame.mean_radii(frames) * (PROFILE[1] - PROFILE[0])
-    apart = np.maximum(np.rint(_INTERPOLATED / step), 1)
-    mixed = np.zeros_like(values)
-    points = frame.project(frames[many], frame.circle_points(ANGLES, PROFILE))
-    between = points - np.floor(points)
-    away = points - frames[many][:, None, None, :2, 2]
-    away /= np.linalg.norm(away, axis=-1, keepdims=True)
-    variance = (away**2 * between * (1 - between)).sum(axis=-1)
-    mixed[many] = variance / ((apart * step)[many, None, None]) ** 2
-    return Seen(values / light, lowest, highest, many, apart.astype(int), mixed)
+def lit(
+    gray: np.ndarray,
+    frames: np.ndarray,
+    lights: Lights,
+    rays: int = RAYS,
+    radii: np.ndarray = PROFILE,
+) -> Seen:
+    """Return the gray values of rays at radii, evenly spaced, without their light."""
+    angles = ray_angles(rays)
+    values = np.maximum(sample_circles(gray, frames, angles, radii), BLACK)
+    some = np.flatnonzero(clipped(values).mean(axis=(1, 2)) > _MANY)
+    light = lights.at(frames, angles, radii)
+    values /= light
+    own = np.maximum(values.mean(axis=2, keepdims=True), np.float32(1e-3))
+    values /= own
+    limits = Limits.of(frames[some], radii, light[some] * own[some])
+    return Seen(values, some, limits)
 
 
 def shares_alike(gray: np.ndarray, frames: np.ndarray) -> np.ndarray:
@@ -176,7 +183,7 @@ class _Fit(ArrayRecord):
 
 @dataclass(frozen=True, slots=True)
 class _Scene(ArrayRecord):
-    """What light is fitted to."""
+    """What light is fitted to; places are the m angles times the n radii."""
 
     seen: np.ndarray  # ln I, (k, m, n)
     values: np.ndarray  # the same, less what blur adds where light and ink change at once
@@ -184,6 +191,8 @@ class _Scene(ArrayRecord):
     slope: np.ndarray  # of what is the same all around, by the radius, (k, n)
     size: np.ndarray  # px, (k,)
     area: np.ndarray  # of what is not clipped, px, (k,)
+    smooth: np.ndarray  # slopes of light and moves of the frame, less means, (k, 6, m n)
+    changing: np.ndarray  # values less means of circles, (k, m n)
 
     @staticmethod
     def of(gray: np.ndarray, frames: np.ndarray, size: np.ndarray) -> _Scene:
@@ -196,7 +205,8 @@ class _Scene(ArrayRecord):
         weight /= weight.sum(axis=(1, 2), keepdims=True)
         values = np.log(values)
         area = np.pi * (_RADII[-1] * size) ** 2 * known.mean(axis=(1, 2))
-        return _Scene(values, values, weight, _slopes(values, weight), size, area)
+        slope = _slopes(values, weight)
+        return _Scene(values, values, weight, slope, size, area, *_smooth(values, weight, slope))
 
     def in_light(self, fit: _Fit) -> _Scene:
         """Return what is seen in a light that is known."""
@@ -205,16 +215,19 @@ class _Scene(ArrayRecord):
         light = light + (heights[:, _OTHERS:] * self._steps(fit.edges)).sum(axis=1)
         slope = _slopes(self.values - light, self.weight)
         values = self.seen - _mixed(light, slope, _LENS / self.size, _STEP)
-        return replace(self, values=values, slope=_slopes(values - light, self.weight))
+        slope = _slopes(values - light, self.weight)
+        smooth, changing = _smooth(values, self.weight, slope)
+        return replace(self, values=values, slope=slope, smooth=smooth, changing=changing)
 
     def fit(self, edges: np.ndarray) -> _Fit:
         """Return the best heights of edges (k, e, 5)."""
-        basis = self._basis(self._steps(edges))
-        rest = _less_means(self.values, self.weight)
-        extra = np.zeros(basis.shape[:2])
+        basis = self._less_means(self._steps(edges))
+        extra = np.zeros((len(basis), _OTHERS + basis.shape[1]))
         extra[:, 2:_OTHERS] = _USUAL_MOVES
-        heights = self._solved(basis, rest, extra, 0.0)
-        rest = rest - (heights[..., None, None].astype(np.float32) * basis).sum(axis=1)
+        heights = self._solved(basis, self.changing, extra, 0.0)
+        of_smooth, of_edges = np.split(heights.astype(np.float32)[:, None], [_OTHERS], axis=2)
+        rest = self.changing - (of_smooth @ self.smooth)[:, 0] - (of_edges @ basis)[:, 0]
+        rest = rest.reshape(self.seen.shape)
         variance = (self.weight * rest**2).sum(axis=(1, 2)) + _LEAST_VARIANCE
         return _Fit(edges, heights, rest, variance)
 
@@ -234,8 +247,8 @@ class _Scene(ArrayRecord):
             bend = -(across**2 + along**2) / 2
             change = np.stack([turn, curved * across - 1, bend, -away], axis=2)
             change = (density[:, :, None] * change).reshape(len(edges), -1, *_X.shape)
-            basis = self._basis(np.concatenate([change, step], axis=1))
-            extra = np.zeros(basis.shape[:2])
+            basis = self._less_means(np.concatenate([change, step], axis=1))
+            extra = np.zeros((len(edges), _OTHERS + basis.shape[1]))
             moving = np.s_[:, _OTHERS : _OTHERS + 4 * count]
             extra[moving] = usual * (fit.variance / self.area)[:, None]
             move = self._solved(basis, fit.rest, extra, damping)[moving]
@@ -254,24 +267,37 @@ class _Scene(ArrayRecord):
     def _steps(self, edges: np.ndarray) -> np.ndarray:
         return _steps(edges, _X, _Y, usual_widths(self.size))
 
-    def _basis(self, of_edges: np.ndarray) -> np.ndarray:
-        """Return slopes, moves and what is of edges (k, b, m, n), less means of circles."""
-        slopes = np.broadcast_to(np.stack([_X, _Y]), (len(self.seen), 2, *_X.shape))
-        moves = -self.slope[:, None, None] * _AROUND
-        return _less_means(np.concatenate([slopes, moves, of_edges], axis=1), self.weight[:, None])
+    def _less_means(self, of_edges: np.ndarray) -> np.ndarray:
+        """Return what is of edges (k, b, m, n) less means of circles, (k, b, m n)."""
+        return _flat(_less_means(of_edges, self.weight[:, None]))
 
     def _solved(
         self, basis: np.ndarray, rest: np.ndarray, extra: np.ndarray, damping: np.ndarray | float
     ) -> np.ndarray:
-        """Return what the columns of a basis (k, b, m, n) have in a rest, (k, b)."""
-        flat = basis.reshape(*basis.shape[:2], -1)
-        weighted = flat * self.weight.reshape(len(flat), 1, -1)
-        normal = (weighted @ flat.transpose(0, 2, 1)).astype(np.float64)
-        right = (weighted @ rest.reshape(len(flat), -1, 1)).astype(np.float64)
+        """Return what is smooth and what is of edges (k, b, m n) in a rest, (k, 6 + b)."""
+        every = np.concatenate([self.smooth, basis], axis=1)
+        weighted = every * self.weight.reshape(len(every), 1, -1)
+        normal = (weighted @ every.transpose(0, 2, 1)).astype(np.float64)
+        right = (weighted @ rest.reshape(len(every), -1, 1)).astype(np.float64)
         index = np.arange(normal.shape[1])
         normal[:, index, index] *= 1 + damping
         normal[:, index, index] += extra + 1e-7
         return np.linalg.solve(normal, right)[..., 0]
+
+
+def _smooth(
+    values: np.ndarray, weight: np.ndarray, slope: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return slopes of light and moves of frames, and values (k, m, n), all less means."""
+    slopes = np.broadcast_to(np.stack([_X, _Y]), (len(values), 2, *_X.shape))
+    moves = -slope[:, None, None] * _AROUND
+    smooth = _less_means(np.concatenate([slopes, moves], axis=1), weight[:, None])
+    return _flat(smooth), _less_means(values, weight).reshape(len(values), -1)
+
+
+def _flat(basis: np.ndarray) -> np.ndarray:
+    """Return (k, b, m, n) as (k, b, m n)."""
+    return basis.reshape(*basis.shape[:2], math.prod(basis.shape[2:]))
 
 
 def _first_look(rest: np.ndarray, size: np.ndarray, count: int) -> np.ndarray:
@@ -331,7 +357,8 @@ def _away(
 def _steps(edges: np.ndarray, x: np.ndarray, y: np.ndarray, width: np.ndarray) -> np.ndarray:
     """Return the steps of edges (k, e, 5) at points, in their heights, shape (k, e, m, n)."""
     share = normal_integral(_away(edges, x, y)[0] / _own_widths(edges, width))
-    return _logarithms(share, edges)[0]
+    height, more = _growth(edges)
+    return np.log1p(more * share) / height
 
 
 def _logarithms(share: np.ndarray, edges: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -339,10 +366,15 @@ def _logarithms(share: np.ndarray, edges: np.ndarray) -> tuple[np.ndarray, np.nd
 
     Blur mixes light, and not its logarithm.
     """
+    height, more = _growth(edges)
+    return np.log1p(more * share) / height, more / height / (1 + more * share)
+
+
+def _growth(edges: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the heights of edges (k, e, 5), ln, none of them 0, and by how much light grows."""
     height = _columns(edges)[3]
     height = np.where(np.abs(height) < 0.01, np.float32(0.01), height)
-    more = np.expm1(height)
-    return np.log1p(more * share) / height, more / (1 + more * share) / height
+    return height, np.expm1(height)
 
 
 def _own_widths(edges: np.ndarray, width: np.ndarray) -> np.ndarray:

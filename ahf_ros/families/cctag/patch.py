@@ -8,13 +8,14 @@ samples a pixel are enough.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ahf_ros.families.cctag.alignment import Aligned
 from ahf_ros.families.cctag.light import Lights, usual_widths
 from ahf_ros.families.cctag.rays import clipped
-from ahf_ros.families.cctag.rings import Aligned
 from ahf_ros.families.cctag.templates import MASK
 from ahf_ros.vision import frame
 from ahf_ros.vision.normal import normal_integral
@@ -99,8 +100,9 @@ class Patch:
 
     known: np.ndarray  # bool, whether pixels are of the target and not clipped, (h, w)
     seen: np.ndarray  # gray values of those, (n,)
-    points: np.ndarray  # fine ones, px, (m, n, 2)
-    light_x: np.ndarray  # the same in the plane of the frame that light is told in, (m, n)
+    fine_x: np.ndarray  # columns of finer points, px, (n,)
+    fine_y: np.ndarray  # their rows, (m,)
+    light_x: np.ndarray  # of finer points, in the plane of the frame of the light, (m, n)
     light_y: np.ndarray
     light_size: float  # radius of that frame, px
     columns: np.ndarray  # distances of pixels from fine points, px, (w, n)
@@ -135,14 +137,13 @@ class Patch:
         fine_x, fine_y = (
             np.arange(of[0] - _MARGIN, of[-1] + _MARGIN + 1 / _FINE, 1 / _FINE) for of in (x, y)
         )
-        place = _in_plane(target, _grid(x, y))
-        known = (np.hypot(*place) < _REACH) & ~clipped(gray[about])
-        points = _grid(fine_x, fine_y)
-        light_x, light_y = _in_plane(light.frames[0], points)
+        known = (np.hypot(*_in_plane(target, x, y)) < _REACH) & ~clipped(gray[about])
+        light_x, light_y = _in_plane(light.frames[0], fine_x, fine_y)
         return Patch(
             known=known,
             seen=gray[about][known].astype(np.float64),
-            points=points,
+            fine_x=fine_x,
+            fine_y=fine_y,
             light_x=light_x,
             light_y=light_y,
             light_size=float(frame.mean_radii(light.frames)[0]),
@@ -168,80 +169,127 @@ class Patch:
         formed = Formed(
             rings.frames[0], float(rings.shift[0]), blur, 0.0, light.heights[0, :2], edges
         )
-        radius = np.hypot(*_in_plane(formed.frame, self.points))
-        bright, ink = self._light(formed)[0], self._ink(radius, formed.shift)[0]
+        bright = np.exp(self._logarithm(formed))
+        ink = self._ink(np.hypot(*self._in_frame(formed)), formed.shift)
         both = self._blurred(np.stack([bright, bright * ink]), blur)[:, self.known].T
         seen = (self.seen / self.seen.max()) ** self.gamma
-        (paper, step), *_ = np.linalg.lstsq(both, seen, rcond=None)
+        paper, step = np.linalg.lstsq(both.T @ both, both.T @ seen, rcond=None)[0]
         return replace(formed, contrast=max(float(step / max(paper, _DARK)), _DARKEST))
 
-    def shown(self, formed: Formed) -> tuple[np.ndarray, np.ndarray]:
-        """Return the gray values that are formed where paper in full light is 1, (n,).
+    def shown(self, formed: Formed) -> np.ndarray:
+        """Return the gray values that are formed where paper in full light is 1, (n,)."""
+        x, y = self._in_frame(formed)
+        ink = self._ink(np.hypot(x, y), formed.shift)
+        sharp = np.exp(self._logarithm(formed)) * (1 + formed.contrast * ink)
+        shown: np.ndarray = self._taken(self._blurred(sharp[None], formed.blur))[0]
+        return shown
 
-        The next are their derivatives by all parameters, (p, n).
-        """
-        x, y = _in_plane(formed.frame, self.points)
-        radius = np.hypot(x, y)
-        ink, by_radius, by_shift = self._ink(radius, formed.shift)
-        light, by_light = self._light(formed)
+    def changes(self, formed: Formed) -> np.ndarray:
+        """Return the derivatives of `shown` by all parameters, (p, n)."""
+        x, y = self._in_frame(formed)
+        radius = np.maximum(np.hypot(x, y), np.float32(1e-6))
+        ink, by_radius, by_shift = self._ink_changes(radius, formed.shift)
+        light, by_light = self._light_changes(formed)
         sharp = light * (1 + formed.contrast * ink)
         on_ink = light * formed.contrast
-        outwards = frame.displacement_basis(np.arctan2(y, x).ravel(), radius.ravel())
-        changes = np.concatenate(
-            [
-                sharp[None],
-                on_ink * by_radius * outwards.T.reshape(SHIFT, *x.shape),
-                (on_ink * by_shift)[None],
-                (light * ink)[None],
-                sharp * by_light,
-            ]
-        )
-        mixed = self._blurred(changes, formed.blur)
+        by_radius *= on_ink
+        cosine, sine = x / radius, y / radius
+        turned = by_radius * cosine, by_radius * sine
+        changes = [
+            sharp,
+            *turned,
+            by_radius * radius,
+            turned[0] * x - turned[1] * y,
+            2 * turned[0] * y,
+            -x * (by_radius * radius),
+            -y * (by_radius * radius),
+            on_ink * by_shift,
+            light * ink,
+            *(sharp * of for of in by_light),
+        ]
+        mixed = self._blurred(np.stack(changes), formed.blur)
         wider, narrower = (
             self._blurred(sharp[None], formed.blur * of) for of in (_APART, 1 / _APART)
         )
         by_blur = (wider - narrower) / (2 * math.log(_APART))
-        shown, *changed = self._taken(np.insert(mixed, SHIFT + 2, by_blur, axis=0))
-        return shown, np.array(changed)
+        return self._taken(np.insert(mixed, SHIFT + 2, by_blur, axis=0))[1:]
 
-    def _ink(self, radius: np.ndarray, shift: float) -> np.ndarray:
-        """Return ink at fine points, and its derivatives by the radius and shift, (3, m, n)."""
-        scale = 1 / np.maximum(np.hypot(*np.gradient(radius, 1 / _FINE)), 1e-6) / _SHARP
-        ink, by_radius, by_shift = seen = np.zeros((3, *radius.shape), np.float32)
+    def _in_frame(self, formed: Formed) -> tuple[np.ndarray, np.ndarray]:
+        """Return x and y of fine points, radii, in the plane of the target."""
+        return _in_plane(formed.frame, self.fine_x, self.fine_y)
+
+    def _circles_away(
+        self, radius: np.ndarray, shift: float
+    ) -> Iterator[tuple[float, np.ndarray]]:
+        """Yield the signs of circles, and how far they are outside of fine points, in blurs."""
+        scale = self._sharpness(radius)
         for circle in self.circles.tolist():
             sign = math.copysign(1.0, circle)
-            away = (abs(circle) - radius) * scale + sign * shift / _SHARP
+            yield sign, (abs(circle) - radius) * scale + sign * shift / _SHARP
+
+    def _ink(self, radius: np.ndarray, shift: float) -> np.ndarray:
+        """Return the ink at fine points, (m, n)."""
+        circles = self._circles_away(radius, shift)
+        return np.asarray(sum(sign * normal_integral(away) for sign, away in circles))
+
+    def _ink_changes(self, radius: np.ndarray, shift: float) -> tuple[np.ndarray, ...]:
+        """Return the ink at fine points, and its derivatives by the radius and shift."""
+        ink, by_radius, by_shift = np.zeros((3, *radius.shape), np.float32)
+        for sign, away in self._circles_away(radius, shift):
             density = np.exp(-0.5 * away**2)
             ink += sign * normal_integral(away)
             by_radius += sign * density
             by_shift += density
-        by_radius *= scale / math.sqrt(2 * math.pi)
+        by_radius *= self._sharpness(radius) / math.sqrt(2 * math.pi)
         by_shift /= _SHARP * math.sqrt(2 * math.pi)
-        return seen
+        return ink, by_radius, by_shift
 
-    def _light(self, formed: Formed) -> tuple[np.ndarray, np.ndarray]:
-        """Return light at fine points, and its derivatives as shares of it, (2 + 5 e, m, n)."""
+    def _sharpness(self, radius: np.ndarray) -> np.ndarray:
+        """Return how many blurs of what is sharp a radius is at fine points, (m, n)."""
+        sharpness: np.ndarray = 1 / np.maximum(
+            np.hypot(*np.gradient(radius, 1 / _FINE)) * np.float32(_SHARP), np.float32(1e-6)
+        )
+        return sharpness
+
+    def _logarithm(self, formed: Formed) -> np.ndarray:
+        """Return ln of the light at fine points, (m, n)."""
+        logarithm = formed.slopes[0] * self.light_x + formed.slopes[1] * self.light_y
+        for edge in formed.edges.tolist():
+            away = self._edge_away(edge)[0]
+            logarithm = logarithm + np.log1p(math.expm1(edge[_HEIGHT]) * normal_integral(away))
+        return logarithm
+
+    def _edge_away(self, edge: list[float]) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
+        """Return how far fine points are from an edge of light, in its widths.
+
+        The next are their distances across and along it, radii, and the width.
+        """
+        direction, offset, curvature, _, width = edge
         x, y = self.light_x, self.light_y
-        logarithm = formed.slopes[0] * x + formed.slopes[1] * y
-        changes = [x, y]
-        for direction, offset, curvature, height, width in formed.edges.tolist():
-            cosine, sine = math.cos(direction), math.sin(direction)
-            across, along = cosine * x + sine * y - offset, cosine * y - sine * x
-            squares = across**2 + along**2
-            wide = max(math.exp(width), _SHARP / self.light_size)
-            away = (across - curvature / 2 * squares) / wide
+        cosine, sine = math.cos(direction), math.sin(direction)
+        across, along = cosine * x + sine * y - offset, cosine * y - sine * x
+        wide = max(math.exp(width), _SHARP / self.light_size)
+        return (across - curvature / 2 * (across**2 + along**2)) / wide, across, along, wide
+
+    def _light_changes(self, formed: Formed) -> tuple[np.ndarray, list[np.ndarray]]:
+        """Return light at fine points, (m, n), and its derivatives as shares of it, 2 + 5 e."""
+        logarithm = formed.slopes[0] * self.light_x + formed.slopes[1] * self.light_y
+        changes = [self.light_x, self.light_y]
+        for edge in formed.edges.tolist():
+            _, offset, curvature, height, _ = edge
+            away, across, along, wide = self._edge_away(edge)
             share, more = normal_integral(away), math.expm1(height)
             light = 1 + more * share
             logarithm = logarithm + np.log(light)
-            density = np.exp(-0.5 * away**2) / (wide * math.sqrt(2 * math.pi)) * more / light
+            density = np.exp(-0.5 * away**2) / light * (more / (wide * math.sqrt(2 * math.pi)))
             changes += [
                 density * along * (1 + curvature * offset),
                 density * (curvature * across - 1),
-                -density * squares / 2,
+                density * (across**2 + along**2) / -2,
                 math.exp(height) * share / light,
-                -density * away * wide,
+                density * away * -wide,
             ]
-        return np.exp(logarithm), np.stack(changes)
+        return np.exp(logarithm), changes
 
     def _blurred(self, sharp: np.ndarray, blur: float) -> np.ndarray:
         """Return the light on pixels, (p, h, w), of what is sharp at fine points."""
@@ -270,12 +318,13 @@ def _mixed(values: np.ndarray, rows: np.ndarray, columns: np.ndarray) -> np.ndar
     return down @ values @ across.T
 
 
-def _grid(x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Return the points of a grid, (m, n, 2)."""
-    return np.stack(np.meshgrid(x, y), axis=-1)
-
-
-def _in_plane(target: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return x and y, radii, float32, of points (m, n, 2) in the plane of a frame."""
-    x, y = np.moveaxis(frame.project(np.linalg.inv(target)[None], points)[0], -1, 0)
-    return x.astype(np.float32), y.astype(np.float32)
+def _in_plane(
+    target: np.ndarray, columns: np.ndarray, rows: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return x and y, radii, float32, of a grid of pixels in the plane of a frame, (m, n)."""
+    inverse = np.linalg.inv(target)
+    at_centre = inverse @ (*target[:2, 2], 1.0)  # single precision is enough from there
+    along_x = np.outer(inverse[:, 0], columns - target[0, 2]).astype(np.float32)
+    along_y = np.outer(inverse[:, 1], rows - target[1, 2]) + at_centre[:, None]
+    x, y, scale = along_x[:, None] + along_y.astype(np.float32)[..., None]
+    return x / scale, y / scale

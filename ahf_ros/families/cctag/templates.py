@@ -52,9 +52,9 @@ def by_value(values: np.ndarray) -> list[tuple[int, np.ndarray]]:
 def less_lines(profiles: np.ndarray, every: int = 1) -> np.ndarray:
     """Return weighted profiles less straight lines, float32, shape (k, n)."""
     weight, line = _weights(every)
-    weighted = profiles * weight
+    weighted = profiles.astype(np.float32, copy=False) * weight
     weighted -= (weighted @ line) @ line.T
-    return weighted.astype(np.float32)
+    return weighted
 
 
 def shares_of(profiles: np.ndarray, of_rings: np.ndarray) -> np.ndarray:
@@ -76,7 +76,7 @@ def _weights(every: int) -> tuple[np.ndarray, np.ndarray]:
     along = PROFILE[::every]
     weight = np.sqrt(along / along.sum())
     line, _ = np.linalg.qr(np.stack([weight, along * weight], axis=1))
-    return weight, line
+    return weight.astype(np.float32), line.astype(np.float32)
 
 
 def _normalised(inks: np.ndarray, every: int) -> np.ndarray:
@@ -90,14 +90,24 @@ def templates(
     family: CircleFamily, step: int, edges: tuple[Edge, ...], every: int = 1
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the ink of all IDs with some edges, shape (t, n), and these edges, (e, 3)."""
-    size, table = SIZE_STEP**step, signed_circles(family, family.numbers)
-    # IDs share circles, so that there are few to compute.
-    signed, inverse = np.unique(table.round(6), return_inverse=True)
+    size, (signed, of_id) = SIZE_STEP**step, _shared_circles(family)
     most = MAXIMUM_SHIFT * family.narrow * size
     tried = np.array(list(dict.fromkeys((min(max(of[0], -most), most), *of[1:]) for of in edges)))
-    inks = _discs_along(signed, size, tried, every)
-    inks = inks[:, inverse.reshape(table.shape)].sum(axis=2)
+    inks = of_id @ _discs_along(signed, size, tried, every)
     return _normalised(_clipped(inks, tried[:, 3]), every), tried[:, :3]
+
+
+@lru_cache
+def _shared_circles(family: CircleFamily) -> tuple[np.ndarray, np.ndarray]:
+    """Return the signed radii of all circles of a family, (c,), and which of them IDs have.
+
+    The latter is 1 or 0, float32, shape (t, c). IDs share circles, so that there are few.
+    """
+    table = signed_circles(family, family.numbers)
+    signed, inverse = np.unique(table.round(6), return_inverse=True)
+    of_id = np.zeros((len(table), len(signed)), np.float32)
+    np.put_along_axis(of_id, inverse.reshape(table.shape), 1.0, axis=1)
+    return signed, of_id
 
 
 @lru_cache(maxsize=256)

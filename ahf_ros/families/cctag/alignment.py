@@ -1,0 +1,275 @@
+"""The rings of IDs are brought onto an image: place, shape, perspective and edges at once.
+
+Neighbouring circles are too close for their edges to be measured one by one. So all gray values
+about a centre are fitted, without the light, which is found first. The values of each ray are a
+linear function of the ink of sharp rings under a normal blur.
+
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ahf_ros.families.cctag.light import Lights, lit
+from ahf_ros.families.cctag.prior import USUAL, Prior
+from ahf_ros.families.cctag.rays import ALONG, PROFILE, RAYS, Rays, robust_rays
+from ahf_ros.families.cctag.templates import MASK, MAXIMUM_SHIFT, rings_along
+from ahf_ros.prints.cctag import CircleFamily
+from ahf_ros.vision import frame
+from ahf_ros.vision.array_record import ArrayRecord
+from ahf_ros.vision.logistic import logistic
+from ahf_ros.vision.normal import normal_integral
+
+_PART = 48  # targets at a time, which bounds the memory
+_OUTLIERS = 12.0, 6.0, 3.0, 3.0  # deviations that quarter a weight, in rounds of Gauss-Newton
+_MAXIMUM_CHANGE = 0.08  # of a frame in a round, radii
+_PERSPECTIVE = 5e-4  # change of scale along a px where tilted by 45 degrees: 1 / focal length, px
+_LEAST_TILT = 0.1  # tangent of the tilt that a circular target may have
+_LEAST_VARIANCE = 1e-6  # of gray values, of their mean
+_OF_VARIANCE = 2.0  # of gray values, that their model adds
+_SHARPEST, _SOFTEST = 0.35, 1.5  # blur: px, and in narrow rings, which more of it would hide
+_SHARPENINGS = 0.0, 4.0  # amounts of it
+_HELD = 1e9  # weight of a bound
+_MOST_OF_EDGES = 0.3, 0.3, 1.0  # change of shift, ln of the blur and sharpening in a round
+_CLEAREST = 0.2  # share of rays
+_AGREEING = 0.5  # share of what a ray shows, that the rings explain
+_OF_TARGET = np.array([-14.1, -1.5, 3.0, -1.0, 1.0])  # of one, and of what follows
+_USUAL_EDGES = 0.13, 0.3  # deviations of growth, px, and of ln of the blur, of targets
+_GROWTH_HIDES = 3.0  # ln of odds, at the most growth
+_SHARPENING_HIDES = 0.8  # ln of odds, of an amount of 1
+_CLIPPING_HIDES = 3.0  # ln of odds, where all gray values are clipped
+_PLAIN = -5.0, 5.0  # beyond which it says no more
+_BY_SIZE, _USUAL_SIZE = 2.5, 12.0  # what `plain` grows by ln of the radius, from its px
+_USUAL_BLURS = 14.0  # the same radius, in standard deviations of the usual blur
+_AS_CLEAR = -6.0  # as it gets, by anything that is round
+_OF_ID = np.array([-1.4, 1.2])  # of one, margin
+
+
+@dataclass(frozen=True, slots=True)
+class Aligned(ArrayRecord):
+    """The rings of k IDs as they are brought onto an image."""
+
+    frames: np.ndarray  # (k, 3, 3), of the outermost circles as printed
+    ids: np.ndarray  # int, (k,)
+    covariance: np.ndarray  # (k, 2, 2), of centres, px^2
+    shift: np.ndarray  # (k,), by which ink has grown, px
+    blur: np.ndarray  # (k,), standard deviation, px
+    sharpening: np.ndarray  # (k,), amount of an unsharp mask
+    colour: np.ndarray  # (k,), 1 where ink is dark, -1 where it is bright
+    rays: np.ndarray  # (k,), share of the rays that show the rings by themselves
+    clear: np.ndarray  # (k,), ln of the share of a ray that is not explained, of clear rays
+    left: np.ndarray  # (k,), ln of the share of a ray that is not explained, on the mean
+    plain: np.ndarray  # (k,), the same of any two edges, less that of the rings
+    unusual: np.ndarray  # (k,), half the squares of deviations of edges, that leave a doubt
+    known: np.ndarray  # (k,), share of gray values that are not clipped
+    margin: np.ndarray  # (k,), ln of the odds against the next ID; NaN before it is known
+    by_pixels: np.ndarray  # (k,), ln of the odds that there is a target, by pixels: 0 if not asked
+
+    @property
+    def edges(self) -> np.ndarray:
+        """Shift, blur and sharpening, shape (k, 3)."""
+        return np.stack([self.shift, self.blur, self.sharpening], axis=1)
+
+    @property
+    def edge_shift(self) -> np.ndarray:
+        """By how much what is dark has grown, px, shape (k,)."""
+        return self.shift * self.colour
+
+    @property
+    def of_target(self) -> np.ndarray:
+        """Probability that there is a target, shape (k,)."""
+        size = frame.mean_radii(self.frames)
+        # Blur takes from large targets what their size adds.
+        large = np.maximum(np.log(size / self.blur / _USUAL_BLURS), 0)
+        plain = self.plain - _BY_SIZE * np.minimum(np.log(size / _USUAL_SIZE), large)
+        clear = np.maximum(self.clear, _AS_CLEAR)
+        features = [clear, np.clip(plain, *_PLAIN), self.unusual, self.by_pixels]
+        return logistic(np.stack(features, axis=1), _OF_TARGET)
+
+    @property
+    def of_id(self) -> np.ndarray:
+        """Probability that a target has the ID, shape (k,)."""
+        return logistic(self.margin[:, None], _OF_ID)
+
+    @property
+    def confidence(self) -> np.ndarray:
+        """Probability that there is a target with the ID, shape (k,)."""
+        return self.of_target * self.of_id
+
+
+NOTHING = Aligned(
+    *(np.zeros((0, 3, 3)), np.zeros(0, int), np.zeros((0, 2, 2)), *np.zeros((12, 0)))
+)
+
+
+def align(
+    gray: np.ndarray,
+    frames: np.ndarray,
+    ids: np.ndarray,
+    edges: np.ndarray,
+    family: CircleFamily,
+    prior: Prior = USUAL,
+    lights: Lights | None = None,
+    rays: int = RAYS,
+) -> Aligned:
+    """Bring the rings of IDs (k,) onto an image from frames (k, 3, 3), known to about a tenth.
+
+    The edges to begin with, (k, 3), are growth of ink and blur, px, and sharpening. The lights are
+    those about the frames, unless they are given.
+    """
+    if lights is None:
+        lights = Lights.about(gray, frames)
+    parts = [slice(start, start + _PART) for start in range(0, len(frames), _PART)]
+    return Aligned.joined(
+        [NOTHING]
+        + [
+            _aligned(
+                *(gray, frames[part], ids[part], edges[part]),
+                *(family, prior, lights.select(part), rays),
+            )
+            for part in parts
+        ]
+    )
+
+
+def _aligned(
+    gray: np.ndarray,
+    frames: np.ndarray,
+    ids: np.ndarray,
+    edges: np.ndarray,
+    family: CircleFamily,
+    prior: Prior,
+    lights: Lights,
+    count: int,
+) -> Aligned:
+    """Return what `align` does, by Gauss-Newton with robust weights."""
+    shift, blur, sharpening = edges.T
+    for outlier in _OUTLIERS:
+        size = frame.mean_radii(frames)
+        seen = lit(gray, frames, lights, count)
+        ink, slope, *by_edges = rings_along(family, ids, size, shift, blur, sharpening)
+        rays = robust_rays(seen, ink, outlier)
+        by_radius = [slope, slope * ALONG, slope * ALONG**2]
+        normal, right = rays.equations(np.stack([*by_radius, *by_edges], axis=1), ink)
+        variance = (rays.weight * rays.errors**2).sum(axis=(1, 2)) / rays.weight.sum(axis=(1, 2))
+        area = size**2 * (PROFILE[1] - PROFILE[0]) * 2 * np.pi / count
+        each = (
+            np.minimum(area, 1.0) / (variance + _LEAST_VARIANCE) / _OF_VARIANCE
+        )  # pixels are independent
+        normal, right = normal * each[:, None, None], right * each[:, None]
+        normal[:, range(5), range(5)] += 1e-6
+        usual = usual_perspective(frames)
+        normal[:, 5:7, 5:7] += usual
+        right[:, 5:7] -= (usual @ frames[:, 2, :2, None])[..., 0]
+        known = np.array(prior.deviations) ** -2
+        normal[:, range(7, 10), range(7, 10)] += known
+        right[:, 7:] -= prior.away(shift, blur, sharpening) * known
+        change = np.linalg.solve(normal, right[..., None])[..., 0]
+        # What goes beyond a bound is held there, so that the others do not make up for it.
+        bounded = np.clip(sharpening + change[:, 9], *_SHARPENINGS) - sharpening
+        held = np.where(bounded == change[:, 9], 0.0, _HELD)
+        normal[:, 9, 9] += held
+        right[:, 9] += held * bounded
+        change = np.linalg.solve(normal, right[..., None])[..., 0]
+        limit = np.concatenate([np.full(7, _MAXIMUM_CHANGE), _MOST_OF_EDGES])
+        change = np.clip(change, -limit, limit)
+        frames = frame.moved(frames, change[:, :7])
+        narrow = family.narrow * size
+        shift = np.clip(shift + change[:, 7], -MAXIMUM_SHIFT * narrow, MAXIMUM_SHIFT * narrow)
+        blur = np.clip(
+            blur * np.exp(change[:, 8]), _SHARPEST, np.maximum(_SOFTEST * narrow, _SHARPEST)
+        )
+        sharpening = np.clip(sharpening + change[:, 9], *_SHARPENINGS)
+    covariance = frame.centre_covariance(frames, np.linalg.inv(normal)[:, :2, :2])
+    seen = lit(gray, frames, lights, count)
+    size = frame.mean_radii(frames)
+    ink = rings_along(family, ids, size, shift, blur, sharpening)[0]
+    rays = Rays.of(seen, ink)
+    left, shown, mean = (
+        (of @ ALONG).astype(np.float64) for of in (rays.errors**2, seen.values**2, seen.values)
+    )
+    shown -= mean**2 / ALONG.sum()
+    agreeing = (left < (1 - _AGREEING) * shown) & (
+        np.sign(rays.step) == np.sign(np.median(rays.step, axis=1))[:, None]
+    )
+    rest = np.log(np.maximum(left, 1e-6) / np.maximum(shown, 1e-6))
+    good = np.where(agreeing, np.exp(-rest), 1e-3)
+    known = (rays.gain * ALONG).sum(axis=2).mean(axis=1) / ALONG.sum()
+    return Aligned(
+        frames=frames,
+        ids=ids,
+        covariance=covariance,
+        shift=shift,
+        blur=blur,
+        sharpening=sharpening,
+        colour=-np.sign(np.median(rays.step, axis=1)),
+        rays=agreeing.mean(axis=1),
+        clear=np.quantile(rest, _CLEAREST, axis=1),
+        left=rest.mean(axis=1),
+        plain=_plain(
+            rays.model + rays.errors / np.maximum(rays.gain, 0.05),
+            rays.model,
+            good[..., None] * rays.weight * rays.gain**2,
+            blur / size,
+        ),
+        unusual=_unusual(shift, blur, prior) * np.minimum(3 * (1 - agreeing.mean(axis=1)), 1)
+        + _hiding(shift, sharpening, known, family.narrow * size),
+        known=known,
+        margin=np.full(len(frames), np.nan),
+        by_pixels=np.zeros(len(frames)),
+    )
+
+
+def _unusual(shift: np.ndarray, blur: np.ndarray, prior: Prior) -> np.ndarray:
+    """Return half the squares of deviations of edges, (k,): chance finds rings of any growth."""
+    deviations = np.stack([shift - prior.shift, np.log(blur / prior.blur)], axis=1) / _USUAL_EDGES
+    return (deviations**2).sum(axis=1) / 2
+
+
+def _hiding(
+    shift: np.ndarray, sharpening: np.ndarray, known: np.ndarray, narrow: np.ndarray
+) -> np.ndarray:
+    """Return by how much growth, sharpening and clipping hide narrow rings of so many px, (k,)."""
+    grown = _GROWTH_HIDES * (shift / (MAXIMUM_SHIFT * narrow)) ** 8
+    sharpened = _SHARPENING_HIDES * sharpening**2 / (1 + np.abs(sharpening))
+    others = sharpened + _CLIPPING_HIDES * (1 - known)
+    return grown + others * (MASK / narrow) ** 2
+
+
+def usual_perspective(frames: np.ndarray) -> np.ndarray:
+    """Return the inverse covariances of the perspective of frames, (k, 2, 2), that is expected.
+
+    Scale changes along the minor axis of a tilted target, the more the more it is foreshortened.
+    """
+    _, axes, directions = np.linalg.svd(frame.local_affine(frames))
+    tilt = np.sqrt(np.maximum((axes[:, 0] / axes[:, 1]) ** 2 - 1, 0))
+    most = np.stack([np.full(len(frames), _LEAST_TILT), tilt + _LEAST_TILT], axis=1)
+    weight = (most * _PERSPECTIVE * frame.mean_radii(frames)[:, None]) ** -2
+    return directions.transpose(0, 2, 1) * weight[:, None] @ directions
+
+
+def _plain(seen: np.ndarray, rings: np.ndarray, good: np.ndarray, blur: np.ndarray) -> np.ndarray:
+    """Return by how much better rings explain a profile than two edges of any height do, (k,).
+
+    It is the difference of ln of what is left of the weighted mean of rays. What is seen, what
+    the rings make of it and the weights `good` have the shape (k, rays, n). The blur is in radii.
+    """
+    shown = good.sum(axis=1)
+    profiles, inks = ((good * of).sum(axis=1) / np.maximum(shown, 1e-9) for of in (seen, rings))
+    weights = np.sqrt(shown / shown.sum(axis=1, keepdims=True))
+    edges = np.linspace(PROFILE[0], PROFILE[-1], 66)[3:-3, None]
+    line, _ = np.linalg.qr(np.stack([weights, PROFILE * weights], axis=2))
+    steps = normal_integral((edges - PROFILE) / blur[:, None, None])
+    values = np.concatenate([profiles[:, None], inks[:, None], steps], axis=1) * weights[:, None]
+    values -= (values @ line) @ line.transpose(0, 2, 1)
+    profile, ink, steps = values[:, 0], values[:, 1], values[:, 2:]
+    total = np.maximum((profile**2).sum(axis=1), 1e-12)
+    steps = steps / np.maximum(np.linalg.norm(steps, axis=2, keepdims=True), 1e-9)
+    along, alike = (steps @ profile[..., None])[..., 0], steps @ steps.transpose(0, 2, 1)
+    both = along[:, :, None] ** 2 + along[:, None] ** 2
+    both -= 2 * alike * along[:, :, None] * along[:, None]
+    of_two = (both / np.maximum(1 - alike**2, 1e-3)).max(axis=(1, 2)) / total
+    of_ink = (ink * profile).sum(axis=1) ** 2 / np.maximum((ink**2).sum(axis=1), 1e-12) / total
+    return np.log(np.maximum(1 - of_two, 1e-6) / np.maximum(1 - of_ink, 1e-6))
