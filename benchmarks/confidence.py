@@ -3,31 +3,38 @@
 Scenes under every condition are rendered (`support.pictures.conditions`, for `gsi` and `dots`
 `support.pictures.dot_conditions`), and every plausible reading is compared with the truth. The
 table shows the reliability of the weights in force by condition. With --fit, logistic regressions
-are fitted to the readings instead, and written to the file of fitted weights. Seeds from 101 on
-are for tests, those below for development.
+are fitted to the readings instead, and written to the file of fitted weights. With --diagram,
+detectors read pictures of three makers where readings begin to fail
+(`support.pictures.conditions.pictures`), and the table shows how often what they state is right:
+what is reported, and undecoded targets whose likely ID is uncertain, from a confidence of 0.5 on.
+`off` is by how much that is more than 3 % and two standard deviations of so many draws away.
+Seeds from 101 on are for tests, those below for development.
 
     python -m benchmarks.confidence [--family ring] [--seeds 101 102]
     python -m benchmarks.confidence --family gsi --fit 1 2 3 4
+    python -m benchmarks.confidence --diagram dots gsi [--seeds 101]
 """
 
 from __future__ import annotations
 
 import json
+import math
 import os
 import re
 import subprocess
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
+from dataclasses import replace
 from functools import partial
-from itertools import pairwise
+from itertools import pairwise, product
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import NamedTuple
 
 import numpy as np
 
-from ahf_ros.base.target import Target
-from ahf_ros.families import DetectorSettings
+from ahf_ros.base.target import UNDECODED, Target, UndecodedTarget
+from ahf_ros.families import DetectorSettings, create_detector
 from ahf_ros.families.dots import rings as dots
 from ahf_ros.families.dots.detector import find_rings
 from ahf_ros.families.gsi import hypotheses as gsi
@@ -43,7 +50,7 @@ from ahf_ros.scenes.scene import Rendering, render
 from ahf_ros.vision.image import as_gray
 from ahf_ros.vision.pyramid import image_pyramid
 from benchmarks import report
-from support.pictures.conditions import COMMON, FOREIGN, Scene, scenes
+from support.pictures.conditions import COMMON, FIRST, FOREIGN, MAKERS, Scene, pictures, scenes
 from support.pictures.dot_conditions import dots_scenes, gsi_scenes, with_covered_dots
 from support.pictures.textures import lookalikes, rough_image
 
@@ -64,6 +71,9 @@ TEXTURES = 6
 
 SIGNS = np.array([1, 1, 1, -1, -1, -1, 1])
 """Of GSI's weights: support, weakest dot, margin and edges that were found speak for a target."""
+
+STATED, ALLOWED = (0.5, 0.7, 0.9, 0.97, 1.0), 0.03
+"""Classes of confidence in the diagram, and by how much their shares may be away."""
 
 LOOKALIKES = 40
 """Images of rings of dots that are no targets, for each seed."""
@@ -363,13 +373,66 @@ def write_weights(
     print(f'{path}: weights of {family}')
 
 
+def read(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
+    """Return the stated confidences of the readings of a scene, and which are right, (k,) each."""
+    settings = replace(scene.settings, report_undecoded=True)
+    found = [
+        (it.x, it.y, likely, it.confidence)
+        for it in create_detector(settings=settings)(scene.image)
+        if (likely := _likely_id(it)) != UNDECODED and it.confidence >= STATED[0]
+    ]
+    x, y, ids, stated = np.array(found).reshape(-1, 4).T
+    true = np.array([(of.x, of.y, of.id) for of in scene.truth]).reshape(-1, 3)
+    near = np.hypot(x[:, None] - true[:, 0], y[:, None] - true[:, 1]) < NEAR
+    return stated, (near & (ids[:, None] == true[:, 2])).any(axis=1)
+
+
+def _likely_id(target: Target) -> int:
+    """Return the ID whose probability is the confidence of a target; `UNDECODED` for none."""
+    if isinstance(target, UndecodedTarget):
+        return target.likely_id if target.reason == 'uncertain' else UNDECODED
+    return target.id
+
+
+def diagram(families: Sequence[str], seeds: Sequence[int]) -> list[str]:
+    """Return the lines of the table of families by maker, and of all makers."""
+    parts: dict[tuple[str, str], list[np.ndarray]] = {}
+    for family, maker, seed in product(families, MAKERS, seeds):
+        for scene in pictures(family, maker, seed):
+            stated = np.stack(read(scene))
+            for of in (maker, 'all'):
+                parts.setdefault((family, of), []).append(stated)
+    rows = []
+    for (family, maker), some in sorted(parts.items()):
+        stated, right = np.concatenate(some, axis=1)
+        for low, high in pairwise(STATED):
+            within = (stated >= low) & ((stated < high) | (high == STATED[-1]))
+            if within.any():
+                counts = shares(stated[within], right[within])
+                rows.append((family, maker, f'{low} to {high}', *counts))
+    head = ('family', 'maker', 'confidence', 'readings', 'stated', 'right', 'error', 'off')
+    return report.table(head, rows)
+
+
+def shares(stated: np.ndarray, right: np.ndarray) -> tuple[int, str, str, str, str]:
+    """Return count, mean confidence, share right, its standard deviation, and what is off."""
+    mean, share = float(stated.mean()), float(right.mean())
+    error = math.sqrt(float((stated * (1 - stated)).sum())) / len(stated)
+    off = max(abs(share - mean) - ALLOWED - 2 * error, 0.0)
+    shown = f'{math.copysign(off, share - mean):+.3f}' if off else ''
+    return len(stated), f'{mean:.3f}', f'{share:.3f}', f'{error:.3f}', shown
+
+
 def main() -> None:
     """Write weights with --fit, or print their reliability as Markdown."""
     made = report.parser(__doc__)
     made.add_argument('--family', choices=KINDS, default='ring')
     made.add_argument('--fit', type=int, nargs='+', metavar='SEED', help='fit the weights anew')
+    made.add_argument('--diagram', nargs='*', choices=FIRST, help='families; all if none is named')
     options = report.parsed(made)
-    if options.fit:
+    if options.diagram is not None:
+        print('\n'.join(diagram(options.diagram or FIRST, options.seeds)))
+    elif options.fit:
         kind = KINDS[options.family]
         weights = kind.fitted(*gathered(kind.readings, options.fit))
         write_weights(options.family, options.fit, weights, kind.weights)

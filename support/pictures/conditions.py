@@ -1,35 +1,42 @@
-"""Scenes under every condition that the confidence of ring targets has to bear.
+"""Scenes under every condition that the confidence of targets has to bear.
 
-The disturbances are other ones than those of `support.pictures.disturbed`: other gray values,
-widths and distances. Only the kinds are the same.
+`scenes` are those of ring targets. The disturbances are other ones than those of
+`support.pictures.disturbed`: other gray values, widths and distances. Only the kinds are the same.
+`pictures` are the same for all families, by three makers, where readings begin to fail.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import product
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
+import cv2
 import numpy as np
 
 from ahf_ros.base.target import Target, TrueTarget
 from ahf_ros.families import DetectorSettings
 from ahf_ros.prints import RING_NAMES
+from ahf_ros.prints.families import print_in
+from ahf_ros.prints.gsi import point_family
 from ahf_ros.prints.ring import FAMILY_NAMES, family, ring_family
 from ahf_ros.scenes.bent.picture import render_bent
+from ahf_ros.scenes.bent.settings import BentSettings
 from ahf_ros.scenes.scene import SceneSettings, render
 from support.pictures import bent, occluders
 from support.pictures.disturbed import blurred, compressed, noisy, overlapping
+from support.pictures.dot_conditions import design
 from support.pictures.drawn_families import LIGHTS, TARGETS, random_family, sheet
 from support.pictures.exposure import Exposure
 from support.pictures.lights import EVERY_LIGHT, LIT, PATTERNS
 from support.pictures.lookalikes import LOOKALIKES
 from support.pictures.phone import phone
 from support.pictures.sheets import COLUMNS, ROWS, mark_sheet, random_numbers, target_sheet
+from support.pictures.textures import lookalikes, rough_image, textured_image
 
 SHADOWS = (0.3, 0.08, 0.04, 0.02)
 """Ambient light of the smaller scenes, as a share of the projector's."""
@@ -63,11 +70,49 @@ PHOTOGRAPHS = 15
 
 CELLS = COLUMNS * ROWS
 
+Made = TypeVar('Made')
+
+NOTHING: Sequence[Target] = ()
+
 COMMON = ('light', 'small', 'phone', 'bent', 'drawn family', 'clean', 'exposure', 'quality')
 """Conditions that most targets are under; the others are rare."""
 
 FOREIGN = ('other family', 'look-alikes', 'clutter')
 """Conditions without a target of the family that is read."""
+
+MAKERS = ('this package', 'bent sheets', 'phone')
+"""Makers of `pictures`."""
+
+HARD = (
+    *('small', 'small', 'small', 'small', 'dark', 'dark', 'blurred', 'blurred'),
+    *('covered', 'covered', 'another kind', 'clutter'),
+)
+"""Conditions of the pictures of a family and a maker; the last two show no target of it."""
+
+FIRST = ('metashape12', 'cct12', 'gsi', 'dots', 'cctag3', 'aruco_4x4_50', 'apriltag_36h11')
+"""A family or two of each kind."""
+
+LIMITS = {
+    'ring': (4.0, 9.0),
+    'gsi': (2.2, 5.0),
+    'dots': (3.5, 8.0),
+    'cctag': (7.0, 16.0),
+    'aruco': (1.7, 4.5),
+    'apriltag': (2.0, 5.0),
+}
+"""Radii of dots, px, from where hardly any target of a kind is read to where most are."""
+
+SIZE = (960, 640)
+"""Width and height of these, px."""
+
+RADII = (1.0, 1.5, 1.5, 2.0, 3.0, 3.6)
+"""Of dots of point-distributed targets, in the unit of the printed design, which has 1.5."""
+
+FILLED, MOST = 0.3, 24
+"""Share of them that targets take at the most, and how many there are."""
+
+SHEETS = 2
+"""Bent sheets that they are on."""
 
 
 class Scene(NamedTuple):
@@ -328,3 +373,120 @@ def strange(seed: int) -> Iterator[Scene]:
             radius = float(generator.choice([9, 13, 18]))
             image = mark_sheet(inks, seed, radius=radius).photograph(Exposure())
             yield Scene('clutter' if kind == 'clutter' else 'look-alikes', image, (), name)
+
+
+def pictures(name: str, maker: str, seed: int) -> Iterator[Scene]:
+    """Yield pictures of a family by a maker, under the conditions `HARD`."""
+    with TemporaryDirectory() as folder:
+        yield from _pictures(name, maker, seed, Path(folder))
+
+
+def _pictures(name: str, maker: str, seed: int, folder: Path) -> Iterator[Scene]:
+    kinds = {print_in(it).kind: it for it in FIRST}
+    foreign = [it for kind, it in kinds.items() if kind != print_in(name).kind]
+    generator = np.random.default_rng([seed, MAKERS.index(maker), *name.encode()])
+    for condition in HARD:
+        own = condition not in HARD[-2:]
+        shown = name if own else str(generator.choice(foreign))
+        drawn = int(generator.integers(2**31))
+        if condition == HARD[-1] and maker != MAKERS[0]:
+            draw = (textured_image, lookalikes, rough_image)[drawn % 3]
+            image, truth = draw(drawn), NOTHING
+        else:
+            image, truth = _picture(shown, condition, maker, drawn, folder)
+        if condition == 'covered':
+            image = covered(image, truth, print_in(name).reach, generator)
+        if maker == MAKERS[2]:
+            image = phone(image, generator)
+        yield Scene(condition, image, truth if own else (), name)
+
+
+def _picture(
+    name: str, condition: str, maker: str, seed: int, folder: Path
+) -> tuple[np.ndarray, Sequence[Target]]:
+    """Return an image and its truth; it is not covered, and no phone has processed it yet."""
+    generator, of = np.random.default_rng(seed), print_in(name)
+    radius = float(np.exp(generator.uniform(*np.log(LIMITS[of.kind]))))
+    radius *= 1.0 if condition == 'small' else 1.5
+    zone = of.design.proportions.quiet_zone * radius
+    room = int(FILLED * SIZE[0] * SIZE[1] / (4 * zone**2))
+    file, larger = '', 1.0
+    if (
+        of.kind == 'gsi' and maker != MAKERS[1]
+    ):  # whose data file need not say how large the dots are
+        printed = float(generator.choice(RADII))
+        file, larger = design(folder, printed), printed / point_family().dot_radius
+    colours = ['dark', 'dark', 'bright'] if of.design.polarity == 'both' else ['auto']
+    colour = str(generator.choice(colours))
+    ambient = 0.05 if condition == 'dark' else float(generator.choice([0.12, 0.3]))
+    blur = float(generator.uniform(1.2, 2.2) if condition == 'blurred' else 0.7)
+    targets = 0 if condition == HARD[-1] else min(MOST, room)
+    if maker == MAKERS[1]:
+        light = f'{generator.choice(EVERY_LIGHT)} {ambient}'
+        share = bent.DOT_SHARES.get(name, 1.0)
+        changes: dict[str, Any] = {
+            'width': SIZE[0],
+            'height': SIZE[1],
+            'sheets': SHEETS,
+            'family_file': file,
+            'dot_radius': larger * radius,
+            'printed_radius': larger * share * BentSettings().printed_radius,
+            'blur': blur,
+        }
+        plain = partial(bent.settings, name, colour, light, 10.0, seed)
+        sheets = render_bent(_with_room(lambda count: replace(plain(count), **changes), targets))
+        return sheets.image, sheets.targets
+    settings = SceneSettings(
+        width=SIZE[0],
+        height=SIZE[1],
+        targets=0,
+        distractors=0 if targets else MOST,
+        family=name,
+        family_file=file,
+        polarity=colour,
+        dot_radius=larger * radius,
+        tilt=float(generator.choice([0, 30, 50])),
+        light=str(generator.choice(EVERY_LIGHT)),
+        light_scale=float(generator.choice([0.5, 1.0])),
+        ambient=ambient,
+        blur=blur,
+        seed=seed,
+    )
+    scene = _with_room(lambda count: render(replace(settings, targets=count)), targets)
+    return scene.image, scene.targets
+
+
+def _with_room(make: Callable[[int], Made], targets: int) -> Made:
+    """Return what can be made of as many targets, or of fewer if there is no room for these."""
+    try:
+        return make(targets)
+    except ValueError:
+        if targets <= 1:
+            raise
+        return _with_room(make, targets // 2)
+
+
+def covered(
+    image: np.ndarray, targets: Sequence[Target], reach: float, generator: np.random.Generator
+) -> np.ndarray:
+    """Return an image, uint8, in which a bar lies over every other target, whose reach is given.
+
+    The bar is as gray as ink, as paper, or as anything between.
+    """
+    seen = image.astype(np.float32)
+    for target in targets[::2]:
+        radius, turn = reach * target.semi_minor, generator.uniform(0, np.pi)
+        across = np.array([np.cos(turn), np.sin(turn)])
+        along = np.array([-across[1], across[0]]) * 1.5 * radius
+        middle = (target.x, target.y) + generator.uniform(-1, 1) * radius * across
+        half = generator.uniform(0.1, 0.5) * radius * across
+        corners = [middle + half + along, middle - half + along]
+        corners += [middle - half - along, middle + half - along]
+        x, y, beyond = round(target.x), round(target.y), round(radius) + 1
+        around = seen[max(y - beyond, 0) : y + beyond, max(x - beyond, 0) : x + beyond]
+        mask = np.zeros(seen.shape, np.float32)
+        cv2.fillConvexPoly(mask, np.rint(np.array(corners) * 16).astype(int), 1.0, cv2.LINE_8, 4)
+        blurred_mask = cv2.GaussianBlur(mask, (0, 0), 0.7)
+        gray = generator.uniform(around.min(), around.max())
+        seen += blurred_mask * (np.float32(gray) - seen)
+    return np.rint(seen).astype(np.uint8)
