@@ -45,7 +45,7 @@ from ahf_ros.families.ring.detector import find_hypotheses
 from ahf_ros.families.ring.hypotheses import Hypotheses
 from ahf_ros.prints.dots import dot_family
 from ahf_ros.prints.gsi import point_family
-from ahf_ros.prints.ring import Family, canonical
+from ahf_ros.prints.ring import RingPrint, canonical
 from ahf_ros.scenes.scene import Rendering, render
 from ahf_ros.vision.image import as_gray
 from ahf_ros.vision.pyramid import image_pyramid
@@ -162,7 +162,7 @@ def readings_of(scene: Scene) -> tuple[np.ndarray, ...]:
 
     Those of targets that nobody is asked for are left out.
     """
-    code = scene.settings.codes(Family)[0]
+    code = scene.settings.codes(RingPrint)[0]
     read = find_hypotheses(as_gray(scene.image), scene.settings)
     read = read.select(read.words > 0)
     _, ids = canonical(read.words, code)

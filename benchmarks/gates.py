@@ -55,7 +55,7 @@ PATIENCE = 900.0
 """Longest time for the pictures with a gate open, s."""
 
 LIGHTS = ('normal', 'stripe', 'lattice')
-TARGETS = 20  # of a rendered scene
+SIZE, TARGETS = (1600, 1066), 20  # of a rendered scene: px
 
 RENDERED: dict[str, tuple[tuple[str, ...], tuple[tuple[float, float], ...]]] = {
     'ring': (('metashape12', 'cct12'), ((6.0, 0.12), (10.0, 0.12), (20.0, 0.04))),
@@ -195,18 +195,26 @@ def photographs(texts: Sequence[str]) -> Iterator[Picture]:
             yield Picture(name, image, truth, 'aicon14')
 
 
-def rendered(detector: str, seeds: Sequence[int], texts: Sequence[str]) -> Iterator[Picture]:
+def rendered(
+    detector: str,
+    seeds: Sequence[int],
+    texts: Sequence[str],
+    *,
+    lights: Sequence[str] = LIGHTS,
+    size: tuple[int, int] = SIZE,
+    targets: int = TARGETS,
+) -> Iterator[Picture]:
     """Yield the chosen scenes by family, seed, light, and size with ambient light."""
     for family, seed, light, (radius, ambient) in product(
-        RENDERED[detector][0], seeds, LIGHTS, RENDERED[detector][1]
+        RENDERED[detector][0], seeds, lights, RENDERED[detector][1]
     ):
         name = f'rendered {family} {radius:g} {light} {seed}'
         if not chosen(name, texts):
             continue
         settings = SceneSettings(
-            width=1600,
-            height=1066,
-            targets=TARGETS,
+            width=size[0],
+            height=size[1],
+            targets=targets,
             distractors=8,
             family=family,
             dot_radius=radius,

@@ -20,7 +20,7 @@ import numpy as np
 from ahf_ros.families import DetectorSettings, create_detector
 from ahf_ros.families.learning.rings import LearntFamily, learn_families
 from ahf_ros.families.ring.bands import find_bands
-from ahf_ros.prints.ring import Family, conforming, ring_family
+from ahf_ros.prints.ring import RingPrint, conforming, ring_family
 from ahf_ros.scenes.evaluation import Score, score, total
 from benchmarks import report
 from benchmarks.report import table
@@ -50,7 +50,7 @@ def rules_right(found: LearntFamily, rule: dict[str, Any]) -> tuple[bool, bool]:
     return same(found.rules), any(same(rules) for rules, _ in found.likely)
 
 
-def learnt_rightly(image: np.ndarray, code: Family, rule: dict[str, Any]) -> tuple[bool, ...]:
+def learnt_rightly(image: np.ndarray, code: RingPrint, rule: dict[str, Any]) -> tuple[bool, ...]:
     """Return whether bits, radii, words, rule, or one that is named, were learnt from an image."""
     found = learn_families(find_bands([image], DetectorSettings()))
     if not found or found[0].bits != code.bits:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ahf_ros.families.ring.circles import REACH
-from ahf_ros.prints.ring import Family
+from ahf_ros.prints.ring import RingPrint
 from ahf_ros.vision.circle_fit import Fit, fit_dots
 from ahf_ros.vision.frame import affine_frames
 
@@ -32,7 +32,7 @@ def made_up(x: Sequence[float], share: float = 1.0, radius: float = 10.0) -> Fit
     )
 
 
-def inked(x: np.ndarray, y: np.ndarray, word: int, code: Family) -> np.ndarray:
+def inked(x: np.ndarray, y: np.ndarray, word: int, code: RingPrint) -> np.ndarray:
     """Return where a target has ink, bool, from coordinates on it in dot radii, y down."""
     radius, angle = np.hypot(x, y), np.arctan2(-y, x) % (2 * np.pi)
     sector = np.minimum(angle / (2 * np.pi) * code.bits, code.bits - 1).astype(int)

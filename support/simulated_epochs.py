@@ -60,7 +60,9 @@ FIELDS = (
 class Epoch:
     """The linearised adjustment of a bundle: errors of image points in, coordinates out."""
 
-    def __init__(self, xyz: FloatArray, photographs: int, bar: bool, rng: np.random.Generator):
+    def __init__(
+        self, xyz: FloatArray, photographs: int, bar: bool, rng: np.random.Generator
+    ) -> None:
         design = _design(xyz, photographs, rng)
         free = movements(xyz, scale=not bar)
         if bar:
@@ -96,7 +98,9 @@ class Epoch:
 class Adjusted:
     """The same by `adjust`: errors of image points in, coordinates out."""
 
-    def __init__(self, xyz: FloatArray, photographs: int, bar: bool, rng: np.random.Generator):
+    def __init__(
+        self, xyz: FloatArray, photographs: int, bar: bool, rng: np.random.Generator
+    ) -> None:
         network, start = simulate(Scene(photographs, len(xyz)), rng)
         self.xyz, self.bar, self.network = xyz, bar, network
         self.start = replace(start, points=xyz)

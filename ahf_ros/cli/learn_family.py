@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from ahf_ros.families.learning.points import Learnt
     from ahf_ros.families.learning.rings import LearntFamily
     from ahf_ros.families.ring.bands import Bands
-    from ahf_ros.prints.gsi import PointFamily
+    from ahf_ros.prints.gsi import PointPrint
 
 _OF_DOTS = 'polarity', 'min_radius', 'max_radius'  # options
 _COLUMNS, _TILE = 6, 180  # of the contact sheet, and width of a picture, px
@@ -234,7 +234,7 @@ def _learn_points(options: argparse.Namespace, points: str) -> int:
     return 0
 
 
-def _report(learnt: Learnt, base: PointFamily, options: argparse.Namespace) -> None:
+def _report(learnt: Learnt, base: PointPrint, options: argparse.Namespace) -> None:
     """Say on standard error what was learnt and what was not."""
     import numpy as np
 

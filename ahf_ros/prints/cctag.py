@@ -18,7 +18,7 @@ _WIDTHS = {'cctag3': (5, 0.10, 0.15), 'cctag4': (7, 0.08, 0.12)}
 
 
 @dataclass(frozen=True, slots=True)
-class CircleFamily(Print):
+class CctagPrint(Print):
     """The CCTags of one number of black rings.
 
     `bits` is the number of rings, black and white, that are read; `narrow` and `wide` are their
@@ -61,7 +61,7 @@ class CircleFamily(Print):
         return 1 - np.concatenate([np.zeros((len(widths), 1)), widths.cumsum(axis=1)], axis=1)
 
 
-def circle_family(name: str) -> CircleFamily:
+def circle_family(name: str) -> CctagPrint:
     """Return the family of a name of `CCTAG_NAMES`.
 
     Examples
@@ -69,4 +69,4 @@ def circle_family(name: str) -> CircleFamily:
     >>> circle_family('cctag3').radii([4]).round(2).tolist()
     [[1.0, 0.9, 0.8, 0.65, 0.55, 0.45]]
     """
-    return CircleFamily(name, *_WIDTHS[name])
+    return CctagPrint(name, *_WIDTHS[name])

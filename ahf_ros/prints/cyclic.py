@@ -13,7 +13,7 @@ Words = TypeVar('Words', int, np.ndarray)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class CyclicFamily(Print):
+class CyclicPrint(Print):
     """Code words of `bits` bits, and their IDs, which are above 0.
 
     `words` has the canonical ones, ndarray of int64, shape (n,), ascending; `numbers` are their

@@ -16,7 +16,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ahf_ros.base.opening import reader
-from ahf_ros.prints.cyclic import CyclicFamily, mirrored_words, smallest_rotation
+from ahf_ros.prints.cyclic import CyclicPrint, mirrored_words, smallest_rotation
 from ahf_ros.prints.data_file import pinhole_in, read_data_file
 from ahf_ros.prints.kept import kept_while_unchanged
 from ahf_ros.prints.prints import Disc, Proportions, Ring, Shape
@@ -28,7 +28,7 @@ _MARGIN = 1.0  # about the border, in radii of the disc
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class DotFamily(CyclicFamily):
+class DotRingPrint(CyclicPrint):
     """The code words of one kind of ring of dots, and the proportions of its print.
 
     Lengths are in radii of the disc: the radius of the circle on which the small dots stand, their
@@ -71,7 +71,7 @@ class DotFamily(CyclicFamily):
 
     def orbits(self, numbers: np.ndarray) -> np.ndarray:
         """Return all rotations and reflections of the word of each ID, shape (n, k)."""
-        turned = CyclicFamily.orbits(self, numbers).astype(np.int64)
+        turned = CyclicPrint.orbits(self, numbers).astype(np.int64)
         both = np.concatenate([turned, mirrored_words(turned, self.bits)], axis=1)
         return both.astype(np.uint64)
 
@@ -87,7 +87,7 @@ class DotFamily(CyclicFamily):
 
 @kept_while_unchanged
 @reader('a data file of rings of dots')
-def dot_family(path: str = '') -> DotFamily:
+def dot_family(path: str = '') -> DotRingPrint:
     """Return the family of rings of dots in a data file; our own where empty.
 
     The file is JSON or YAML, see docs/dots.md. A ValueError names line and field of what is not
@@ -119,7 +119,7 @@ def dot_family(path: str = '') -> DotFamily:
     words = np.arange(1, (1 << bits) - 1)  # neither the empty ring nor the full one
     words = words[words == smallest_bracelet(words, bits)]
     words.setflags(write=False)
-    return DotFamily(
+    return DotRingPrint(
         name=fields['family'].text(),
         bits=bits,
         words=words,

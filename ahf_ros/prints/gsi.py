@@ -49,7 +49,7 @@ class Rule:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class PointFamily(Print):
+class PointPrint(Print):
     """The printed design and the codes of one family of point-distributed targets.
 
     Attributes
@@ -195,7 +195,7 @@ def valid_words(places: Mapping[int, Sequence[float]], rule: Rule) -> np.ndarray
 
 @kept_while_unchanged
 @reader('a data file of point-distributed targets')
-def point_family(path: str = '') -> PointFamily:
+def point_family(path: str = '') -> PointPrint:
     """Return the family of point-distributed targets in a data file; GSI's own where empty.
 
     The file is JSON or YAML, see docs/gsi.md. A ValueError names line and field of what is not
@@ -224,7 +224,7 @@ def point_family(path: str = '') -> PointFamily:
     words, ids = (np.array(list(of), np.int64) for of in (codes, codes.values()))
     for array in (points, dots, numbers, words, ids):
         array.setflags(write=False)
-    return PointFamily(
+    return PointPrint(
         name=fields['family'].text(),
         unit=fields['unit'].text() if 'unit' in fields else '',
         source=fields['source'].text() if 'source' in fields else '',

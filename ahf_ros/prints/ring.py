@@ -21,7 +21,7 @@ import numpy as np
 
 from ahf_ros.base.opening import reader
 from ahf_ros.prints import RING_FOLDER, RING_NAMES, VENDOR_NAMES
-from ahf_ros.prints.cyclic import CyclicFamily, mirrored_words, smallest_rotation
+from ahf_ros.prints.cyclic import CyclicPrint, mirrored_words, smallest_rotation
 from ahf_ros.prints.data_file import Entry, pinhole_in, read_data_file
 from ahf_ros.prints.prints import Disc, Proportions, Ring, Sectors, Shape
 
@@ -42,7 +42,7 @@ _WIDER = 1.2  # quiet zone of larger targets, times their reach
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Family(CyclicFamily):
+class RingPrint(CyclicPrint):
     """The words of one kind of ring target, and its print; lengths are in radii of the dot.
 
     Where the radii of the band are free, `bounds` has those of the inner and of the outer one, and
@@ -109,7 +109,7 @@ class Family(CyclicFamily):
 
 
 @cache
-def family(name: str) -> Family:
+def family(name: str) -> RingPrint:
     """Return a family of ring codes by its name; raise a ValueError if there is none.
 
     The lists of metashape12, metashape14, aicon12 and aicon14 were compared with published tables
@@ -128,7 +128,7 @@ def family(name: str) -> Family:
 
 
 @reader('a data file of rings')
-def ring_family(path: str) -> Family:
+def ring_family(path: str) -> RingPrint:
     """Return the family of ring codes that a data file describes.
 
     A ValueError names the line and the field of what is not accepted in it.
@@ -152,7 +152,7 @@ def ring_family(path: str) -> Family:
         numbers = _numbers(fields.get('numbers'), words, bits)
     for of in (words, numbers):
         of.setflags(write=False)
-    return Family(
+    return RingPrint(
         name=fields['family'].text(),
         bits=bits,
         words=words,
@@ -282,7 +282,7 @@ def marks(words: np.ndarray, bits: int) -> np.ndarray:
 
 
 @cache
-def least_marked(code: Family) -> float:
+def least_marked(code: RingPrint) -> float:
     """Return the share of the band that has marks in the word with the fewest of these."""
     return float(marks(code.words, code.bits).min() / code.bits)
 
@@ -310,7 +310,7 @@ def _numbers(rule: Entry | None, words: np.ndarray, bits: int) -> np.ndarray:
     return smallest_rotation(mirrored_words(words, bits), bits) if mirrored else words.copy()
 
 
-def canonical(words: np.ndarray, family: Family) -> tuple[np.ndarray, np.ndarray]:
+def canonical(words: np.ndarray, family: RingPrint) -> tuple[np.ndarray, np.ndarray]:
     """Return the canonical code words and the IDs of words of a family in any rotation.
 
     All are ndarrays of int64, shape (k,), and every word is one of the family.
@@ -328,7 +328,9 @@ def sectors(word: int, bits: int) -> np.ndarray:
     return (word >> np.arange(bits) & 1).astype(bool)
 
 
-def words_of_print(code: Family, word: int, families: Sequence[Family]) -> dict[Family, int]:
+def words_of_print(
+    code: RingPrint, word: int, families: Sequence[RingPrint]
+) -> dict[RingPrint, int]:
     """Return the canonical words of those of some families whose targets have the print of a word.
 
     A word all of whose runs are a multiple of some angle may be a word of other numbers of
@@ -346,8 +348,8 @@ def words_of_print(code: Family, word: int, families: Sequence[Family]) -> dict[
 
 
 def words_of_prints(
-    code: Family, words: np.ndarray, families: Sequence[Family]
-) -> list[dict[Family, int]]:
+    code: RingPrint, words: np.ndarray, families: Sequence[RingPrint]
+) -> list[dict[RingPrint, int]]:
     """Return the same for each of k words, ndarray of int, shape (k,)."""
     same = (code.band, code.circles)
     alike = [other for other in families if (other.band, other.circles) == same]
@@ -359,7 +361,7 @@ def words_of_prints(
         repeated = np.repeat(blocks[..., 0], bits // blocks.shape[1], axis=1)
         canonical = smallest_rotation(repeated @ (1 << np.arange(bits)), bits)
         spread[bits] = np.where(whole, canonical, 0)
-    found: list[dict[Family, int]] = [{} for _ in words]
+    found: list[dict[RingPrint, int]] = [{} for _ in words]
     for other in alike:
         of_print = spread[other.bits]
         for index in np.flatnonzero(other.has(of_print)).tolist():

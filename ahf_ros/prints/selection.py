@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ahf_ros.prints.cyclic import CyclicFamily, rotated_words
+from ahf_ros.prints.cyclic import CyclicPrint, rotated_words
 from ahf_ros.prints.prints import Print
 
 _STARTS = 4
@@ -150,7 +150,7 @@ def _confused(design: Print, ids: np.ndarray) -> np.ndarray:
     An ID and itself may be such a pair.
     """
     confused = np.zeros((ids.size, ids.size), bool)
-    if not isinstance(design, CyclicFamily):
+    if not isinstance(design, CyclicPrint):
         return confused
     words = design.words_of(ids)
     every = design.canonical(np.arange(1 << design.bits))

@@ -14,7 +14,7 @@ from ahf_ros.base.blas import one_blas_thread
 from ahf_ros.base.settings.parameter import check_parameters, parameter
 from ahf_ros.base.target import Target, TrueTarget, sorted_targets
 from ahf_ros.prints.families import ONE, FamilyPrint, print_in
-from ahf_ros.prints.gsi import PointFamily
+from ahf_ros.prints.gsi import PointPrint
 from ahf_ros.prints.prints import Proportions
 from ahf_ros.scenes.camera import Camera, Sensor, tilted_camera
 from ahf_ros.scenes.covers import card_cover, distractor_cover, ink_cover
@@ -229,7 +229,7 @@ def drawn_numbers(settings: Any, generator: np.random.Generator) -> list[int]:
     """
     design, count = settings.print.design, settings.targets
     # IDs are drawn from those of gsi in the order of its data file
-    every = design.numbers if isinstance(design, PointFamily) else design.all_ids
+    every = design.numbers if isinstance(design, PointPrint) else design.all_ids
     rounds = -(-count // len(every))
     shuffled = [generator.permutation(every) for _ in range(rounds)]
     return np.concatenate([np.empty(0, int), *shuffled])[:count].tolist()

@@ -34,7 +34,7 @@ from ahf_ros.families.ring.bands import DotsOfOctave, bands_about, dots_in
 from ahf_ros.identification.settling import evident, still_shown
 from ahf_ros.prints import SQUARE_NAMES
 from ahf_ros.prints.families import AUTO, prints_of
-from ahf_ros.prints.ring import FAMILY_NAMES, Family, words_of_print
+from ahf_ros.prints.ring import FAMILY_NAMES, RingPrint, words_of_print
 from ahf_ros.prints.square import has_dictionary
 from ahf_ros.vision.dot_search import whole_dots
 from ahf_ros.vision.image import as_gray, check_image
@@ -251,7 +251,7 @@ def _largest_told(settings: DetectorSettings) -> float:
 def _of_shared_prints(image: np.ndarray, settings: DetectorSettings) -> Iterator[str]:
     """Yield what targets are that several of the families have, too few to tell which it is."""
     rings = [of.design for of in settings.prints.values() if of.kind == 'ring']
-    codes = {code.name: code for code in rings if isinstance(code, Family)}
+    codes = {code.name: code for code in rings if isinstance(code, RingPrint)}
     widest = [code.name for code in codes.values() if code.has_all_words]
     if not 0 < len(widest) < len(codes):
         return
@@ -287,7 +287,7 @@ def _of_bands(
     """Yield what dots with bands say, seen in an image that was enlarged by a scale."""
     polarity, count = int(np.median(found.bands.polarity)), len(found.words)
     own = prints_of(settings.family_file).values() if settings.family_file else ()
-    known = found.known([of.design for of in own if isinstance(of.design, Family)])
+    known = found.known([of.design for of in own if isinstance(of.design, RingPrint)])
     rings = settings.narrowed(known or FAMILY_NAMES)
     size = _of_size(count, float(np.median(found.bands.size)) / scale, rings)
     edges = edge_shift_remark(found.growth * polarity / scale)

@@ -12,7 +12,7 @@ import numpy as np
 
 from ahf_ros.base.target import TrueTarget
 from ahf_ros.prints.cyclic import smallest_rotation
-from ahf_ros.prints.ring import FAMILY_NAMES, Family, family
+from ahf_ros.prints.ring import FAMILY_NAMES, RingPrint, family
 from support.pictures import occluders
 from support.pictures.exposure import Exposure
 from support.pictures.sheets import COLUMNS, Sheet, random_numbers, target_sheet
@@ -127,7 +127,7 @@ def overlapping(
     return sheet.photograph(Exposure(occluder=papers)), truth
 
 
-def far_apart(code: Family, sectors: int, seed: int) -> tuple[int, ...]:
+def far_apart(code: RingPrint, sectors: int, seed: int) -> tuple[int, ...]:
     """Return IDs that cannot look alike, up to a number of sectors of each covered.
 
     Parameters

@@ -10,7 +10,7 @@ from dataclasses import replace
 import cv2
 import numpy as np
 
-from ahf_ros.prints.ring import BITS, Family, sectors
+from ahf_ros.prints.ring import BITS, RingPrint, sectors
 from ahf_ros.scenes.covers import Cover, ink_cover, stamp_cover
 from support.pictures.sheets import CELL, Ink
 
@@ -22,14 +22,14 @@ _MIDDLE = (_SIDE // 2, _SIDE // 2)
 _REACH = 3.8  # half of the side of clutter, dot radii
 
 
-def random_arcs(family: Family, generator: np.random.Generator) -> Ink:
+def random_arcs(family: RingPrint, generator: np.random.Generator) -> Ink:
     """Return a dot, and arcs of any length in the band of a family."""
     edges = np.sort(generator.choice(_FINE, 2 * generator.integers(2, 6), replace=False))
     inked = np.searchsorted(edges, np.arange(_FINE), side='right') % 2
     return _ring(replace(family, bits=_FINE), int(inked @ (1 << np.arange(_FINE))))
 
 
-def other_sectors(family: Family, generator: np.random.Generator) -> Ink:
+def other_sectors(family: RingPrint, generator: np.random.Generator) -> Ink:
     """Return a dot and a band whose number of sectors is not that of a family."""
     while True:
         bits = int(generator.integers(BITS[0], BITS[1] + 1))
@@ -38,7 +38,7 @@ def other_sectors(family: Family, generator: np.random.Generator) -> Ink:
             return _ring(replace(family, bits=bits), word)
 
 
-def other_words(family: Family, generator: np.random.Generator) -> Ink:
+def other_words(family: RingPrint, generator: np.random.Generator) -> Ink:
     """Return a dot and a band with a word that a family does not have."""
     while True:
         word = int(generator.integers(1, (1 << family.bits) - 1))
@@ -46,7 +46,7 @@ def other_words(family: Family, generator: np.random.Generator) -> Ink:
             return _ring(family, word)
 
 
-def other_radii(family: Family, generator: np.random.Generator) -> Ink:
+def other_radii(family: RingPrint, generator: np.random.Generator) -> Ink:
     """Return a dot and a codeword of a family in a band whose radii no shift of edges explains."""
     word = int(generator.choice(family.words))
     inner, outer = family.band
@@ -58,7 +58,7 @@ def other_radii(family: Family, generator: np.random.Generator) -> Ink:
             return _ring(replace(family, band_inner=band[0], band_outer=band[1]), word)
 
 
-def two_bands(family: Family, generator: np.random.Generator) -> Ink:
+def two_bands(family: RingPrint, generator: np.random.Generator) -> Ink:
     """Return a dot and two bands, as RAD targets have, of as many sectors as a family has."""
     radii = 1 + np.cumsum(generator.uniform(0.3, 0.8, 4))
     words = generator.integers(1, (1 << family.bits) - 1, 2).tolist()
@@ -74,7 +74,7 @@ def two_bands(family: Family, generator: np.random.Generator) -> Ink:
     return ink
 
 
-def cctag(_family: Family, generator: np.random.Generator) -> Ink:
+def cctag(_family: RingPrint, generator: np.random.Generator) -> Ink:
     """Return concentric circles of three or four rings, about paper or about a dot."""
     stamp = np.zeros((_SIDE, _SIDE), np.uint8)
     widths = generator.uniform(1, 3, 2 * generator.integers(3, 5))
@@ -85,7 +85,7 @@ def cctag(_family: Family, generator: np.random.Generator) -> Ink:
     return lambda turn: stamp_cover(stamp, min(1 / radii[0], CELL - 0.2), turn)
 
 
-def clutter(_family: Family, generator: np.random.Generator) -> Ink:
+def clutter(_family: RingPrint, generator: np.random.Generator) -> Ink:
     """Return a matrix code, text, a gear, a clock, a dartboard, a bar code or closed rings."""
     kinds = (_matrix_code, _text, _gear, _clock, _dartboard, _bars, _closed_rings)
     stamp = np.zeros((_SIDE, _SIDE), np.uint8)
@@ -93,7 +93,7 @@ def clutter(_family: Family, generator: np.random.Generator) -> Ink:
     return lambda turn: stamp_cover(stamp, _REACH, turn)
 
 
-LOOKALIKES: dict[str, Callable[[Family, np.random.Generator], Ink]] = {
+LOOKALIKES: dict[str, Callable[[RingPrint, np.random.Generator], Ink]] = {
     'random arcs': random_arcs,
     'other numbers of sectors': other_sectors,
     'other words': other_words,
@@ -105,7 +105,7 @@ LOOKALIKES: dict[str, Callable[[Family, np.random.Generator], Ink]] = {
 """Kinds of marks that are no targets of a family."""
 
 
-def _ring(family: Family, word: int) -> Ink:
+def _ring(family: RingPrint, word: int) -> Ink:
     return lambda turn: ink_cover(family.ink(word, 0.05), turn)
 
 

@@ -140,7 +140,9 @@ def test_images_without_circles_have_no_targets() -> None:
 
 
 @pytest.mark.lasting
-def test_texture_is_read_no_longer_than_it_may_have_a_target(monkeypatch) -> None:
+def test_texture_is_read_no_longer_than_it_may_have_a_target(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     read: list[int] = []
 
     def counted(gray: np.ndarray, frames: np.ndarray, most: int = EDGES) -> Lights:

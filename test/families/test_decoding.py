@@ -9,7 +9,7 @@ import pytest
 
 from ahf_ros.families.ring.decoding import Words, bits_at, decode, lengthened
 from ahf_ros.families.ring.likelihood import SURPRISES, Evidence
-from ahf_ros.prints.ring import FAMILY_NAMES, Family, canonical, family
+from ahf_ros.prints.ring import FAMILY_NAMES, RingPrint, canonical, family
 
 CODE = family('metashape12')
 PER_SECTOR = 10
@@ -34,7 +34,7 @@ def seen(marked: np.ndarray, weight: float = 1.0) -> Evidence:
     )
 
 
-def of_word(word: int, phase: int = 0, code: Family = CODE) -> np.ndarray:
+def of_word(word: int, phase: int = 0, code: RingPrint = CODE) -> np.ndarray:
     """Return where a band shows marks, shape (1, m)."""
     return bits_at(np.array([word]), np.array([phase]), PER_SECTOR, code)
 
@@ -46,7 +46,7 @@ def hidden_at(clear: Evidence, covered: slice | np.ndarray) -> Evidence:
     return replace(clear, paper=paper, ink=ink)
 
 
-def read(evidence: Evidence, overhang: float = 0.0, code: Family = CODE) -> Words:
+def read(evidence: Evidence, overhang: float = 0.0, code: RingPrint = CODE) -> Words:
     return decode(evidence, np.full(len(evidence.weight), overhang), code)
 
 

@@ -64,7 +64,7 @@ def test_corners_and_centre() -> None:
 
 
 @pytest.mark.parametrize('shift', [-1.0, -0.4, 0.5, 1.0])
-def test_edges_that_moved_are_known_and_move_neither_corners_nor_centres(shift) -> None:
+def test_edges_that_moved_are_known_and_move_neither_corners_nor_centres(shift: float) -> None:
     fitted = fitted_to(drawn(grown=shift))
     assert fitted.edge_shift[0] == pytest.approx(shift, abs=0.1)
     assert np.abs(fitted.corners[0] - CORNERS).max() < 0.1
@@ -73,7 +73,7 @@ def test_edges_that_moved_are_known_and_move_neither_corners_nor_centres(shift) 
 
 @pytest.mark.parametrize('side', range(4))
 @pytest.mark.parametrize('cut', [(0.5, 0.9), (0.9, 0.2)], ids=str)
-def test_paper_that_covers_a_side_is_not_taken_for_it(side, cut) -> None:
+def test_paper_that_covers_a_side_is_not_taken_for_it(side: int, cut: tuple[float, float]) -> None:
     # The edge of the paper runs within the border, so many cells inside the side at its ends.
     first, last = SQUARE[side], SQUARE[(side + 1) % 4]
     inwards = (SQUARE[(side + 2) % 4] - last) / len(INK)
@@ -102,7 +102,7 @@ def test_several_at_once_are_those_one_by_one() -> None:
 
 
 @pytest.mark.parametrize('angle', [20, 45, 70, 110])
-def test_edges_of_light_that_cross_the_marker_do_not_move_it(angle) -> None:
+def test_edges_of_light_that_cross_the_marker_do_not_move_it(angle: int) -> None:
     rows, columns = np.indices((HEIGHT, WIDTH))
     across = columns * np.cos(np.radians(angle)) + rows * np.sin(np.radians(angle))
     light = np.where(across % 37 < 18, 200.0, 70.0)

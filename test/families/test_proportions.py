@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 
 from ahf_ros import identify
-from ahf_ros.prints.ring import Family, canonical, family
+from ahf_ros.prints.ring import RingPrint, canonical, family
 from support.ring import inked
 
 RADIUS, FINE = 17.0, 4  # of dots, px; rays across a pixel
@@ -15,7 +15,7 @@ ASIDE = 1.0  # of the paper beyond bands, dot radii
 PROPORTION = 0.955  # of bands, to those of their print
 
 
-def target(word: int, code: Family) -> np.ndarray:
+def target(word: int, code: RingPrint) -> np.ndarray:
     """Return the reflectance of a target, shape (n, n), which shows FINE rays in a pixel."""
     side = round(2 * RADIUS * (code.band_outer + ASIDE)) * FINE
     along = (np.arange(side) - (side - 1) / 2) / (RADIUS * FINE)

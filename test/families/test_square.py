@@ -44,7 +44,7 @@ def scene(family: str = FAMILY, **changes: object) -> Rendering:
     ],
 )
 @pytest.mark.parametrize('tilt', [0.0, 45.0])
-def test_markers_and_their_physical_centres(detector, family, tilt) -> None:
+def test_markers_and_their_physical_centres(detector: str, family: str, tilt: float) -> None:
     shown = scene(family=family, tilt=tilt, targets=4)
     made = create_detector(family=family)
     assert (made.name, made.family) == (detector, family)
@@ -53,7 +53,7 @@ def test_markers_and_their_physical_centres(detector, family, tilt) -> None:
     assert score(shown, found).rmse[2] < 0.03
 
 
-def test_centres_of_markers_whose_cells_are_wider_than_any_blur(detect) -> None:
+def test_centres_of_markers_whose_cells_are_wider_than_any_blur(detect: Detector) -> None:
     size = {'width': 1800, 'height': 1400, 'dot_radius': 60.0, 'targets': 4, 'seed': 31}
     shown = scene(full_well=0.0, **size)
     errors = score(shown, detect(shown.image)).errors
@@ -62,7 +62,7 @@ def test_centres_of_markers_whose_cells_are_wider_than_any_blur(detect) -> None:
 
 @pytest.mark.parametrize(('gamma', 'low', 'high'), [(1.0, 0.45, 0.65), (2.2, -0.05, 0.05)])
 def test_gamma_is_taken_out_of_the_shift_and_does_not_change_the_size(
-    gamma, low, high, detect
+    gamma: float, low: float, high: float, detect: Detector
 ) -> None:
     shown = scene(gamma=gamma, dot_radius=30.0, targets=2)
     true = {target.id: target for target in shown.targets}
@@ -95,7 +95,7 @@ def test_markers_show_their_dictionary_together() -> None:
 
 
 @pytest.mark.parametrize(('family', 'seed'), [('aruco_4x4_50', 3), ('aruco_4x4_250', 5)])
-def test_doubtful_markers_show_their_dictionary_together(family, seed) -> None:
+def test_doubtful_markers_show_their_dictionary_together(family: str, seed: int) -> None:
     """Under these stripes no marker is sure enough to be of one dictionary of many."""
     size = {'width': 1400, 'height': 1000, 'targets': 12, 'dot_radius': 12.0}
     shown = scene(family, **size, light='stripe', ambient=0.12, seed=seed)
@@ -107,7 +107,7 @@ def test_doubtful_markers_show_their_dictionary_together(family, seed) -> None:
 
 
 @pytest.mark.parametrize('family', ['aruco_4x4_50', 'apriltag_16h5', 'aruco_5x5_50'])
-def test_a_single_marker_shows_its_dictionary(family) -> None:
+def test_a_single_marker_shows_its_dictionary(family: str) -> None:
     detect = create_detector(family=','.join(SQUARE_NAMES))
     evidence = 0
     for seed in range(1, 6):
@@ -124,7 +124,7 @@ def test_hardly_any_texture_is_a_marker() -> None:
 
 
 @pytest.mark.parametrize(('family', 'seed'), [('aruco_4x4_1000', 4), ('aruco_4x4_50', 39)])
-def test_letters_are_no_markers_with_few_edges(family, seed) -> None:
+def test_letters_are_no_markers_with_few_edges(family: str, seed: int) -> None:
     assert create_detector(family=family)(textured_image(seed)) == []
 
 
@@ -186,7 +186,7 @@ def test_sides_of_letters_converge() -> None:
 
 
 @pytest.mark.parametrize('seed', [8, 9])
-def test_plain_markers_show_their_dictionary_with_others(seed) -> None:
+def test_plain_markers_show_their_dictionary_with_others(seed: int) -> None:
     shown = scene('aruco_original', seed=seed)
     found = create_detector(family=','.join(SQUARE_NAMES))(shown.image)
     assert counted(shown, found) == (6, 0, 0)
@@ -229,7 +229,7 @@ def test_markers_of_ten_pixels_are_read_in_sharp_images() -> None:
 
 
 @pytest.mark.parametrize(('family', 'least'), [('apriltag_36h11', 16), ('aruco_6x6_250', 18)])
-def test_small_markers_whose_ink_has_grown(family, least) -> None:
+def test_small_markers_whose_ink_has_grown(family: str, least: int) -> None:
     """Doubtful ones are read where their prints lie; none is one with a border of two cells."""
     size = {'width': 1600, 'height': 1200, 'targets': 20, 'dot_radius': 10 / 3, 'seed': 1}
     shown = scene(family, **size, edge_shift=0.5)
@@ -252,7 +252,7 @@ def washed_out(number: int, cell: int) -> np.ndarray:
 
 
 @pytest.mark.parametrize('cell', [6, 8, 12])
-def test_markers_whose_paper_is_washed_out(cell) -> None:
+def test_markers_whose_paper_is_washed_out(cell: int) -> None:
     detect = create_detector(family='apriltag_36h11')
     read = [[it.id for it in detect(washed_out(number, cell))] for number in (6, 7, 100, 300)]
     assert read == [[6], [7], [100], [300]]
@@ -271,7 +271,7 @@ def test_not_fewer_markers_where_an_image_is_enlarged() -> None:
 
 
 @pytest.mark.parametrize('gray', [0, 90, 255])
-def test_a_covered_marker_is_read(gray) -> None:
+def test_a_covered_marker_is_read(gray: int) -> None:
     shown = scene(family='apriltag_36h11')
     image = shown.image.copy()
     for target in shown.targets:
@@ -296,7 +296,7 @@ def test_markers_of_another_dictionary_are_not_seen() -> None:
 
 
 @pytest.mark.lasting
-def test_the_filter_finds_markers_that_stripes_hide(detect) -> None:
+def test_the_filter_finds_markers_that_stripes_hide(detect: Detector) -> None:
     shown = scene(light='stripe', ambient=0.1, seed=4)
     without = score(shown, detect(shown.image))
     found = identify(shown.image, detector=detect, expected_targets=6, max_evaluations=40)
@@ -306,7 +306,7 @@ def test_the_filter_finds_markers_that_stripes_hide(detect) -> None:
 
 
 @pytest.mark.parametrize('light', ['stripe', 'lattice', 'fringe'])
-def test_places_are_those_of_the_image_as_received(light, detect) -> None:
+def test_places_are_those_of_the_image_as_received(light: str, detect: Detector) -> None:
     shown = scene(light=light, ambient=0.3)
     found = identify(shown.image, detector=detect, expected_targets=6)
     assert counted(shown, found) == (6, 0, 0)
@@ -316,7 +316,7 @@ def test_places_are_those_of_the_image_as_received(light, detect) -> None:
         assert (other.x, other.y) == pytest.approx((one.x, one.y), abs=0.02)
 
 
-def test_corners_and_ellipse_are_those_of_the_marker(detect) -> None:
+def test_corners_and_ellipse_are_those_of_the_marker(detect: Detector) -> None:
     shown = scene()
     true = {target.id: target for target in shown.targets}
     for target in detect(shown.image):
@@ -329,7 +329,7 @@ def test_corners_and_ellipse_are_those_of_the_marker(detect) -> None:
         assert across[0] * down[1] > across[1] * down[0]  # clockwise as seen, y pointing down
 
 
-def test_what_neither_edges_nor_print_fit_states_its_error(detect) -> None:
+def test_what_neither_edges_nor_print_fit_states_its_error(detect: Detector) -> None:
     """On wavy paper contours alone tell where a marker is."""
     shown = scene(targets=16, dot_radius=12.0)
     places = np.array([(it.x, it.y) for it in shown.targets])
@@ -348,7 +348,7 @@ def test_what_neither_edges_nor_print_fit_states_its_error(detect) -> None:
     assert squares.max() < 12
 
 
-def test_what_has_no_corners_or_no_sides_stays_where_it_is(detect) -> None:
+def test_what_has_no_corners_or_no_sides_stays_where_it_is(detect: Detector) -> None:
     shown = scene()
     markers = detect(shown.image)
     others = [Target(1, 1, 50.0, 60.0, 5.0, 5.0), Target(2, 2, -900.0, 60.0, 5.0, 5.0)]
@@ -358,7 +358,7 @@ def test_what_has_no_corners_or_no_sides_stays_where_it_is(detect) -> None:
     assert detect.refine(shown.image, []) == []
 
 
-def test_any_kind_of_image(detect) -> None:
+def test_any_kind_of_image(detect: Detector) -> None:
     shown = scene()
     same = detect(shown.image)
     for image in (shown.image.astype(np.uint16) * 16, shown.image[:, ::-1][:, ::-1]):

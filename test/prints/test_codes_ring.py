@@ -12,7 +12,7 @@ from ahf_ros.prints import RING_NAMES
 from ahf_ros.prints.cyclic import smallest_rotation
 from ahf_ros.prints.ring import (
     FAMILY_NAMES,
-    Family,
+    RingPrint,
     family,
     ring_family,
     sectors,
@@ -153,7 +153,7 @@ def test_cct_numbers_are_the_words_that_its_programs_print() -> None:
 FAMILY = {'family': 'mine', 'bits': 12, 'band': [2, 3], 'words': 'all'}
 
 
-def described(folder: Path, **fields: object) -> Family:
+def described(folder: Path, **fields: object) -> RingPrint:
     """Return a family of a data file, whose fields are None where they are missing."""
     content = {name: value for name, value in (FAMILY | fields).items() if value is not None}
     path = folder / 'family.yaml'

@@ -150,7 +150,7 @@ def test_files_describe_more_families(files: str) -> None:
     assert list(found) == [*every, 'mine', 'wide']
     assert [found[name].kind for name in ('mine', 'wide', 'gsi')] == ['ring', 'dots', 'gsi']
     mine = found['mine'].design
-    assert isinstance(mine, ring.Family) and mine.band == (1.42, 1.87)
+    assert isinstance(mine, ring.RingPrint) and mine.band == (1.42, 1.87)
     assert print_in('metashape12', files).design is ring.family('metashape12')
     assert print_in('Mine', files).design is mine
     check_numbers('ids', [1, 2], [found['mine']])

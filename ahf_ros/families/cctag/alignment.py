@@ -16,7 +16,7 @@ from ahf_ros.families.cctag.light import Lights, lit
 from ahf_ros.families.cctag.prior import USUAL, Prior
 from ahf_ros.families.cctag.rays import ALONG, PROFILE, RAYS, Rays, robust_rays
 from ahf_ros.families.cctag.templates import MASK, MAXIMUM_SHIFT, rings_along
-from ahf_ros.prints.cctag import CircleFamily
+from ahf_ros.prints.cctag import CctagPrint
 from ahf_ros.vision import frame
 from ahf_ros.vision.array_record import ArrayRecord
 from ahf_ros.vision.logistic import logistic
@@ -109,7 +109,7 @@ def align(
     frames: np.ndarray,
     ids: np.ndarray,
     edges: np.ndarray,
-    family: CircleFamily,
+    family: CctagPrint,
     prior: Prior = USUAL,
     lights: Lights | None = None,
     rays: int = RAYS,
@@ -139,7 +139,7 @@ def _aligned(
     frames: np.ndarray,
     ids: np.ndarray,
     edges: np.ndarray,
-    family: CircleFamily,
+    family: CctagPrint,
     prior: Prior,
     lights: Lights,
     count: int,

@@ -29,7 +29,7 @@ from ahf_ros.families.claims import owners
 from ahf_ros.families.contract import moved_targets
 from ahf_ros.families.pyramid_detector import PyramidDetector
 from ahf_ros.prints import CCTAG_NAMES
-from ahf_ros.prints.cctag import CircleFamily, circle_family
+from ahf_ros.prints.cctag import CctagPrint, circle_family
 from ahf_ros.vision import frame
 from ahf_ros.vision.candidates import cells_along, find_peaks
 from ahf_ros.vision.dot_search import voted_dots, whole_dots
@@ -72,9 +72,9 @@ class CctagDetector(PyramidDetector):
     contrast: ClassVar[int] = 2  # for circles that blur makes gray
 
     @property
-    def design(self) -> tuple[CircleFamily, ...]:
+    def design(self) -> tuple[CctagPrint, ...]:
         """Printed designs of the families."""
-        return self.settings.codes(CircleFamily)
+        return self.settings.codes(CctagPrint)
 
     @one_blas_thread()
     def search(self, pyramid: ImagePyramid) -> list[Target]:
@@ -153,14 +153,14 @@ class _Look:
     """What looks like targets of one colour and family in an octave."""
 
     polarity: int
-    family: CircleFamily
+    family: CctagPrint
     frames: np.ndarray  # (k, 3, 3), the likeliest first
     lights: Lights  # about those of the first that may be targets, of one edge at the most
     prior: Prior  # before any target is read
 
 
 def _looks(
-    of_octaves: Sequence[Octave], kinds: Sequence[tuple[int, CircleFamily]], prior: Prior
+    of_octaves: Sequence[Octave], kinds: Sequence[tuple[int, CctagPrint]], prior: Prior
 ) -> dict[int, list[_Look]]:
     """Return what looks like targets of some colours and families, by the levels of octaves.
 
@@ -290,7 +290,7 @@ def _first_readings(gray: np.ndarray, look: _Look) -> tuple[Aligned, int]:
 
 
 def _readings(
-    gray: np.ndarray, lights: Lights, polarity: int, family: CircleFamily, prior: Prior
+    gray: np.ndarray, lights: Lights, polarity: int, family: CctagPrint, prior: Prior
 ) -> Aligned:
     """Return readings of targets in their lights, and of doubtful ones in light of less edges."""
     found = identify(gray, lights, polarity, family, prior)
@@ -362,7 +362,7 @@ def _single(rings: Aligned) -> Aligned:
     return rings.select(single | (rings.confidence < _CERTAIN))
 
 
-def _owned(gray: np.ndarray, rings: Aligned, polarity: int, family: CircleFamily) -> Aligned:
+def _owned(gray: np.ndarray, rings: Aligned, polarity: int, family: CctagPrint) -> Aligned:
     """Return the readings; what other families make of doubtful targets are rivals, too.
 
     The more targets of an image are of the family, the likelier are the others.

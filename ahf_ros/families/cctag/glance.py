@@ -25,7 +25,7 @@ from ahf_ros.families.cctag.templates import (
     templates,
     totals,
 )
-from ahf_ros.prints.cctag import CircleFamily
+from ahf_ros.prints.cctag import CctagPrint
 from ahf_ros.vision import frame
 from ahf_ros.vision.array_record import ArrayRecord
 from ahf_ros.vision.dots import Dots
@@ -118,7 +118,7 @@ class _Outermost(ArrayRecord):
             profiles=resampled[row, step],
         )
 
-    def better(self, polarity: int, family: CircleFamily) -> np.ndarray:
+    def better(self, polarity: int, family: CctagPrint) -> np.ndarray:
         """Return how much likelier the rings of a family are than discs, (k,), 0 if unlikely."""
         narrow = family.narrow * self.radius
         tried = np.flatnonzero((narrow >= _NARROWEST) & (self.sign * polarity >= 0))
@@ -151,14 +151,14 @@ def _resampling() -> np.ndarray:
 
 @lru_cache(maxsize=512)
 def _templates(
-    family: CircleFamily, size: int, edges: tuple[Edge, ...]
+    family: CctagPrint, size: int, edges: tuple[Edge, ...]
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return templates of rings and of discs; all sizes of both families have their place."""
     return templates(family, size, edges, _EVERY)[0], discs(size, edges, _EVERY)
 
 
 def _better(
-    profiles: np.ndarray, family: CircleFamily, size: int, edges: tuple[Edge, ...]
+    profiles: np.ndarray, family: CctagPrint, size: int, edges: tuple[Edge, ...]
 ) -> np.ndarray:
     """Return by how much less of profiles, (k, n), rings leave than discs, ln, (k,).
 
@@ -180,7 +180,7 @@ def _better(
 def likely_rings(
     circles: Circles,
     radii: Sequence[tuple[float, float]],
-    kinds: Sequence[tuple[int, CircleFamily]],
+    kinds: Sequence[tuple[int, CctagPrint]],
 ) -> list[list[np.ndarray]]:
     """Return the frames of outermost circles whose mean profile looks like rings, (k, 3, 3) each.
 

@@ -22,7 +22,7 @@ from ahf_ros.families.cctag.prior import Prior
 from ahf_ros.families.cctag.rays import FEW_RAYS
 from ahf_ros.families.cctag.templates import MAXIMUM_SHIFT, signed_circles
 from ahf_ros.prints import CCTAG_NAMES
-from ahf_ros.prints.cctag import CircleFamily, circle_family
+from ahf_ros.prints.cctag import CctagPrint, circle_family
 from ahf_ros.vision import frame
 from ahf_ros.vision.image import GAMMA, as_light
 
@@ -44,7 +44,7 @@ _BEYOND_DOUBT = (
 _OF_MARGIN = 0.1  # share of ln of the odds of IDs, by pixels, that is believed
 
 
-def jointly(gray: np.ndarray, rings: Aligned, family: CircleFamily) -> Aligned:
+def jointly(gray: np.ndarray, rings: Aligned, family: CctagPrint) -> Aligned:
     """Return rings (k,) that are in place to a part of a px, with places that pixels give.
 
     Large ones, and those that the model does not explain as well as others, stay as they are.
@@ -60,7 +60,7 @@ def jointly(gray: np.ndarray, rings: Aligned, family: CircleFamily) -> Aligned:
     return rings
 
 
-def contested(gray: np.ndarray, rings: Aligned, polarity: int, family: CircleFamily) -> Aligned:
+def contested(gray: np.ndarray, rings: Aligned, polarity: int, family: CctagPrint) -> Aligned:
     """Return readings (k,) with the places that pixels give; what is in doubt is as pixels show.
 
     Doubts need enough certain targets, which tell how well rings are seen in this image.
@@ -98,12 +98,12 @@ class _Scene:
     gray: np.ndarray
     light: np.ndarray  # of the gray values, whose gamma is the next
     gamma: float
-    family: CircleFamily
+    family: CctagPrint
     usual: Usual
     begun: dict[int, Fit]  # of some targets, by their rows
 
     @staticmethod
-    def of(gray: np.ndarray, rings: Aligned, rows: np.ndarray, family: CircleFamily) -> _Scene:
+    def of(gray: np.ndarray, rings: Aligned, rows: np.ndarray, family: CctagPrint) -> _Scene:
         """Return an image with what the likeliest of the targets in rows tell, gamma with it."""
         telling = rows[np.argsort(-rings.plain[rows], kind='stable')[:_TELLING]]
         tried = [

@@ -17,7 +17,7 @@ from ahf_ros.families.cctag.templates import (
     templates,
     two_discs,
 )
-from ahf_ros.prints.cctag import CircleFamily
+from ahf_ros.prints.cctag import CctagPrint
 from ahf_ros.vision import frame
 from ahf_ros.vision.array_record import ArrayRecord
 
@@ -74,7 +74,7 @@ def likely_ids(
     gray: np.ndarray,
     lights: Lights,
     polarity: int,
-    family: CircleFamily,
+    family: CctagPrint,
     prior: Prior,
     count: int = _READINGS,
 ) -> Likely:

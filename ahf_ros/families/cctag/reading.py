@@ -12,7 +12,7 @@ from ahf_ros.families.cctag.likely_ids import Likely, likely_ids
 from ahf_ros.families.cctag.prior import USUAL, Prior
 from ahf_ros.families.cctag.rays import FEW_RAYS
 from ahf_ros.families.cctag.templates import less_lines
-from ahf_ros.prints.cctag import CircleFamily
+from ahf_ros.prints.cctag import CctagPrint
 from ahf_ros.vision import frame
 from ahf_ros.vision.image import as_light
 
@@ -42,7 +42,7 @@ def identify(
     gray: np.ndarray,
     lights: Lights,
     polarity: int,
-    family: CircleFamily,
+    family: CctagPrint,
     prior: Prior = USUAL,
     most: int = EDGES,
 ) -> Aligned:
@@ -77,7 +77,7 @@ def _likeliest(
     likely: Likely,
     lights: Lights,
     polarity: int,
-    family: CircleFamily,
+    family: CctagPrint,
     prior: Prior,
 ) -> Aligned:
     """Return the best readings, (k,), of which the first IDs are aligned, with their margins.
@@ -106,7 +106,7 @@ def _likeliest(
 
 
 def _settled(
-    gray: np.ndarray, rings: Aligned, family: CircleFamily, prior: Prior, lights: Lights
+    gray: np.ndarray, rings: Aligned, family: CctagPrint, prior: Prior, lights: Lights
 ) -> Aligned:
     """Return rings brought onto the image until they stay; what still moves is as uncertain."""
     moving = np.arange(len(rings.ids))
@@ -128,7 +128,7 @@ def _settled(
     return rings
 
 
-def in_light(gray: np.ndarray, rings: Aligned, family: CircleFamily) -> tuple[np.ndarray, Aligned]:
+def in_light(gray: np.ndarray, rings: Aligned, family: CctagPrint) -> tuple[np.ndarray, Aligned]:
     """Return an image of light, where rings show clearly that its gray values have a gamma.
 
     Blur mixes light, and not gray values, which matters where rings are narrow. The image is the

@@ -8,7 +8,7 @@ from functools import lru_cache
 import numpy as np
 
 from ahf_ros.families.cctag.rays import ALONG, PROFILE
-from ahf_ros.prints.cctag import CircleFamily
+from ahf_ros.prints.cctag import CctagPrint
 from ahf_ros.vision.normal import normal_integral
 
 SIZE_STEP = 1.05
@@ -87,7 +87,7 @@ def _normalised(inks: np.ndarray, every: int) -> np.ndarray:
 
 @lru_cache(maxsize=256)
 def templates(
-    family: CircleFamily, step: int, edges: tuple[Edge, ...], every: int = 1
+    family: CctagPrint, step: int, edges: tuple[Edge, ...], every: int = 1
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the ink of all IDs with some edges, shape (t, n), and these edges, (e, 3)."""
     size, (signed, of_id) = SIZE_STEP**step, _shared_circles(family)
@@ -98,7 +98,7 @@ def templates(
 
 
 @lru_cache
-def _shared_circles(family: CircleFamily) -> tuple[np.ndarray, np.ndarray]:
+def _shared_circles(family: CctagPrint) -> tuple[np.ndarray, np.ndarray]:
     """Return the signed radii of all circles of a family, (c,), and which of them IDs have.
 
     The latter is 1 or 0, float32, shape (t, c). IDs share circles, so that there are few.
@@ -152,7 +152,7 @@ def _clipped(inks: np.ndarray, shares: np.ndarray) -> np.ndarray:
 
 
 def rings_along(
-    family: CircleFamily,
+    family: CctagPrint,
     ids: np.ndarray,
     size: np.ndarray,
     shift: np.ndarray,
@@ -167,7 +167,7 @@ def rings_along(
     return _circles(signed_circles(family, ids), size, shift, blur, sharpening)
 
 
-def signed_circles(family: CircleFamily, ids: np.ndarray) -> np.ndarray:
+def signed_circles(family: CctagPrint, ids: np.ndarray) -> np.ndarray:
     """Return the radii of the circles of IDs (k,), below 0 where paper fills them, (k, c)."""
     radii = family.radii(ids)
     return _signs(radii) * radii

@@ -18,7 +18,7 @@ from ahf_ros.families.contract import DetectorSettings, moved_targets
 from ahf_ros.families.dots.discs import judged, small_discs, voted_discs, whole_discs
 from ahf_ros.families.dots.rings import CERTAIN, Rings, fit_targets, likely_targets, read_discs
 from ahf_ros.families.pyramid_detector import PyramidDetector
-from ahf_ros.prints.dots import DotFamily
+from ahf_ros.prints.dots import DotRingPrint
 from ahf_ros.vision.ellipse_targets import ellipse_fields, frames_of, stayed
 from ahf_ros.vision.frame import affine_frames, ellipse_axes
 from ahf_ros.vision.image import as_gray, check_image
@@ -36,9 +36,9 @@ class DotsDetector(PyramidDetector):
     patience: ClassVar[int] = 3
 
     @property
-    def design(self) -> DotFamily:
+    def design(self) -> DotRingPrint:
         """Printed design of the family."""
-        return self.settings.codes(DotFamily)[0]
+        return self.settings.codes(DotRingPrint)[0]
 
     @one_blas_thread()
     def search(self, pyramid: ImagePyramid) -> list[Target]:
@@ -86,7 +86,7 @@ class DotsDetector(PyramidDetector):
 def find_rings(
     pyramid: ImagePyramid,
     settings: DetectorSettings,
-    code: DotFamily,
+    code: DotRingPrint,
     expected: frozenset[int] = frozenset(),
 ) -> Rings:
     """Return all rings of dots that an image may show, before any decision."""

@@ -15,7 +15,7 @@ import cv2
 import numpy as np
 
 from ahf_ros.families.contract import DetectorSettings
-from ahf_ros.prints.dots import DotFamily
+from ahf_ros.prints.dots import DotRingPrint
 from ahf_ros.vision.common_search import BLOBS
 from ahf_ros.vision.dot_search import voted_dots, whole_dots
 from ahf_ros.vision.dots import NO_DOTS, Dots, distinct
@@ -71,7 +71,7 @@ def open_regions(edges: LogEdges, outlines: np.ndarray) -> list[tuple[slice, sli
 
 
 def whole_discs(
-    pyramid: ImagePyramid, settings: DetectorSettings, code: DotFamily, _known: np.ndarray
+    pyramid: ImagePyramid, settings: DetectorSettings, code: DotRingPrint, _known: np.ndarray
 ) -> Dots:
     """Return dots with a whole outline, which may be a disc or the border of one."""
     low, high = settings.radii
@@ -89,7 +89,7 @@ def whole_discs(
 
 
 def voted_discs(
-    pyramid: ImagePyramid, settings: DetectorSettings, code: DotFamily, known: np.ndarray
+    pyramid: ImagePyramid, settings: DetectorSettings, code: DotRingPrint, known: np.ndarray
 ) -> Dots:
     """Return dots whose outline edges of light interrupt, outside of known targets."""
     outlines = _outlines(known, code, _MARGIN)
@@ -97,7 +97,7 @@ def voted_discs(
 
 
 def small_discs(
-    pyramid: ImagePyramid, settings: DetectorSettings, code: DotFamily, known: np.ndarray
+    pyramid: ImagePyramid, settings: DetectorSettings, code: DotRingPrint, known: np.ndarray
 ) -> Dots:
     """Return small dots, and those seen at steep angles, where edges are left to explain."""
     # Edges of light end at a target, and look like no straight ones there.
@@ -109,7 +109,7 @@ def small_discs(
     return Dots.joined(found)
 
 
-def _outlines(known: np.ndarray, code: DotFamily, margin: float | np.ndarray) -> np.ndarray:
+def _outlines(known: np.ndarray, code: DotRingPrint, margin: float | np.ndarray) -> np.ndarray:
     """Return polygons about targets, px of the image, at a distance in disc radii."""
     return circle_outlines(known, np.zeros(len(known)) + code.border_radius + margin)
 
@@ -142,7 +142,7 @@ def _blobs(
     return found
 
 
-def judged(pyramid: ImagePyramid, dots: Dots, known: np.ndarray, code: DotFamily) -> Dots:
+def judged(pyramid: ImagePyramid, dots: Dots, known: np.ndarray, code: DotRingPrint) -> Dots:
     """Return the dots outside of known targets about which a border is seen.
 
     Their radius is the one that fits disc and border best, their share that of the expected steps.
@@ -167,7 +167,7 @@ def border_steps(
     log: np.ndarray,
     frames: np.ndarray,
     polarity: np.ndarray,
-    code: DotFamily,
+    code: DotRingPrint,
     scales: np.ndarray,
 ) -> np.ndarray:
     """Return the mean step of ln I at the edges of disc and border, in steps of the disc.
@@ -179,7 +179,7 @@ def border_steps(
     frames : ndarray of float64, shape (k, 3, 3)
         Of the discs.
     polarity : ndarray of int, shape (k,)
-    code : DotFamily
+    code : DotRingPrint
     scales : ndarray of float, shape (n,)
         Radii that the discs may have, in radii of the frames.
 

@@ -9,7 +9,7 @@ import numpy as np
 from ahf_ros.families.dots.discs import border_steps
 from ahf_ros.families.words import UNEXPECTED
 from ahf_ros.prints.cyclic import mirrored_words, rotated_words
-from ahf_ros.prints.dots import DotFamily
+from ahf_ros.prints.dots import DotRingPrint
 from ahf_ros.vision.array_record import ArrayRecord
 from ahf_ros.vision.circle_fit import Fit
 from ahf_ros.vision.dot_evidence import PIXELS_ASIDE, circle_sides, dot_evidence
@@ -61,7 +61,7 @@ class Readings(ArrayRecord):
     inside: np.ndarray
 
 
-def read_rings(log: np.ndarray, fit: Fit, code: DotFamily) -> Readings:
+def read_rings(log: np.ndarray, fit: Fit, code: DotRingPrint) -> Readings:
     """Read the rings of fitted discs and borders; `log` is LOG_SCALE ln(I + 8), int16."""
     count, bits, polarity = len(fit.frames), code.bits, fit.polarity
     disc = np.diff(circle_sides(log, fit.frames)[0])[..., 0]
@@ -112,7 +112,7 @@ def read_rings(log: np.ndarray, fit: Fit, code: DotFamily) -> Readings:
     )
 
 
-def expecting(readings: Readings, code: DotFamily, expected: frozenset[int]) -> Readings:
+def expecting(readings: Readings, code: DotRingPrint, expected: frozenset[int]) -> Readings:
     """Return readings once some IDs are likely to be there.
 
     One of these takes the place of a word that is not much likelier. Others must be wrong at two
@@ -137,6 +137,6 @@ def expecting(readings: Readings, code: DotFamily, expected: frozenset[int]) -> 
     )
 
 
-def dot_points(angles: np.ndarray, code: DotFamily) -> np.ndarray:
+def dot_points(angles: np.ndarray, code: DotRingPrint) -> np.ndarray:
     """Return the centres of small dots in directions, rad clockwise from +x, shape (..., 2)."""
     return code.dot_circle * np.stack([np.cos(angles), np.sin(angles)], axis=-1)

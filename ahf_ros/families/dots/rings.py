@@ -20,7 +20,7 @@ from ahf_ros.base.target import UNDECODED, DottedTarget
 from ahf_ros.families.claims import best_of_places
 from ahf_ros.families.contract import DetectorSettings
 from ahf_ros.families.dots.reading import Readings, dot_points, expecting, read_rings
-from ahf_ros.prints.dots import DotFamily
+from ahf_ros.prints.dots import DotRingPrint
 from ahf_ros.vision.array_record import ArrayRecord
 from ahf_ros.vision.circle_fit import Fit, fit_circles_of_any_blur, on_circles
 from ahf_ros.vision.dots import Dots
@@ -52,7 +52,7 @@ _OF_TARGET, _OF_WORD = read_weights(WEIGHTS, 'dots_confidence', 'target', 'word'
 
 
 def fit_targets(
-    gray: np.ndarray, frames: np.ndarray, polarity: np.ndarray, code: DotFamily
+    gray: np.ndarray, frames: np.ndarray, polarity: np.ndarray, code: DotRingPrint
 ) -> Fit:
     """Fit the edges of disc and border; the frames of the discs are known to about a pixel."""
     angles = 2 * np.pi * np.arange(_RAYS) / _RAYS
@@ -168,7 +168,7 @@ def word_probability(features: np.ndarray) -> np.ndarray:
 def read_discs(
     pyramid: ImagePyramid,
     discs: Dots,
-    code: DotFamily,
+    code: DotRingPrint,
     expected: frozenset[int] = frozenset(),
 ) -> Rings:
     """Return the rings of dots about discs, as far as they lie in the image.
@@ -183,7 +183,7 @@ def read_discs(
 
 
 def _read_part(
-    pyramid: ImagePyramid, discs: Dots, code: DotFamily, expected: frozenset[int]
+    pyramid: ImagePyramid, discs: Dots, code: DotRingPrint, expected: frozenset[int]
 ) -> Rings:
     fit = fit_targets(pyramid.gray, discs.frames, discs.polarity, code)
     fit = fit.select((fit.share >= _PLAUSIBLE) & (fit.contrast <= _MAXIMUM_CONTRAST))
@@ -208,7 +208,7 @@ def _read_part(
 
 
 def likely_targets(
-    rings: Rings, settings: DetectorSettings, code: DotFamily
+    rings: Rings, settings: DetectorSettings, code: DotRingPrint
 ) -> list[DottedTarget]:
     """Return the targets whose words are certain, or all that there are if these are reported.
 
@@ -220,7 +220,7 @@ def likely_targets(
     return best_of_places(_targets(rings.select(shown), code), code.border_radius)
 
 
-def _targets(rings: Rings, code: DotFamily) -> list[DottedTarget]:
+def _targets(rings: Rings, code: DotRingPrint) -> list[DottedTarget]:
     ids = code.ids(rings.words)
     valid = ids > 0
     places = ellipse_fields(rings.frames, rings.covariance, rings.edge_shift)
@@ -254,7 +254,7 @@ def _targets(rings: Rings, code: DotFamily) -> list[DottedTarget]:
 
 
 def _ellipses(
-    frame: np.ndarray, word: int, phase: float, radius: float, code: DotFamily
+    frame: np.ndarray, word: int, phase: float, radius: float, code: DotRingPrint
 ) -> tuple[Any, ...]:
     """Return the ellipses of disc, border and dots of one ring as `DottedTarget` has them."""
     which = np.flatnonzero(word >> np.arange(code.bits) & 1)

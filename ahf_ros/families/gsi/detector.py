@@ -43,7 +43,7 @@ from ahf_ros.families.gsi.refinement import (
 )
 from ahf_ros.families.pyramid_detector import PyramidDetector
 from ahf_ros.families.undecoded import undecoded
-from ahf_ros.prints.gsi import PointFamily
+from ahf_ros.prints.gsi import PointPrint
 from ahf_ros.vision import frame
 from ahf_ros.vision.dot_search import voted_dots, whole_dots
 from ahf_ros.vision.dots import Dots, distinct
@@ -68,9 +68,9 @@ class GsiDetector(PyramidDetector):
     patience: ClassVar[int] = 3
 
     @property
-    def design(self) -> PointFamily:
+    def design(self) -> PointPrint:
         """Printed design of the family."""
-        return self.settings.codes(PointFamily)[0]
+        return self.settings.codes(PointPrint)[0]
 
     @one_blas_thread()
     def search(self, pyramid: ImagePyramid) -> list[Target]:
@@ -118,7 +118,7 @@ class GsiDetector(PyramidDetector):
 def find_hypotheses(
     pyramid: ImagePyramid,
     settings: DetectorSettings,
-    code: PointFamily,
+    code: PointPrint,
     expected: frozenset[int] = frozenset(),
 ) -> tuple[Hypotheses, Dots]:
     """Return the groups of dots that may be targets, and all dots outside of certain targets.
@@ -153,7 +153,7 @@ def _with_others(
 def read_targets(
     pyramid: ImagePyramid,
     dots: Dots,
-    code: PointFamily,
+    code: PointPrint,
     known: Hypotheses,
     expected: frozenset[int] = frozenset(),
     *,
@@ -181,7 +181,7 @@ def read_targets(
 def _read(
     pyramid: ImagePyramid,
     templates: Templates,
-    code: PointFamily,
+    code: PointPrint,
     expected: frozenset[int],
     *,
     obvious: bool,
@@ -207,7 +207,7 @@ def _placed(
     pyramid: ImagePyramid,
     groups: Templates | Hypotheses,
     words: np.ndarray,
-    code: PointFamily,
+    code: PointPrint,
     expected: frozenset[int],
 ) -> Hypotheses:
     """Return hypotheses with homographies through all of their dots, read once more."""
@@ -229,9 +229,7 @@ def _placed(
     )
 
 
-def likely_targets(
-    hypotheses: Hypotheses, code: PointFamily, minimum: float
-) -> list[DottedTarget]:
+def likely_targets(hypotheses: Hypotheses, code: PointPrint, minimum: float) -> list[DottedTarget]:
     """Return the targets whose codes have a minimum of confidence, one in each place."""
     some = hypotheses.select(resolve(hypotheses, code, minimum))
     return [
@@ -273,7 +271,7 @@ def uncoded(
 
 
 def _printed(
-    words: np.ndarray, code: PointFamily, scale: np.ndarray | None = None
+    words: np.ndarray, code: PointPrint, scale: np.ndarray | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return places and radii of the dots of k targets in the design, shapes (k, n, 2), (k, n).
 
@@ -289,7 +287,7 @@ def _printed(
 
 
 def _fields(
-    placed: Placement | Hypotheses, words: np.ndarray, code: PointFamily
+    placed: Placement | Hypotheses, words: np.ndarray, code: PointPrint
 ) -> list[dict[str, Any]]:
     """Return the fields of targets that say where they are, and where their dots are seen."""
     places, radii = _printed(words, code, placed.scale)

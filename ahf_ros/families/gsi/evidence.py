@@ -13,7 +13,7 @@ import numpy as np
 
 from ahf_ros.families.gsi.grouping import Templates
 from ahf_ros.families.words import against, margins
-from ahf_ros.prints.gsi import PointFamily
+from ahf_ros.prints.gsi import PointPrint
 from ahf_ros.vision.array_record import ArrayRecord
 from ahf_ros.vision.black import black_lift, lifted
 from ahf_ros.vision.dot_evidence import circle_sides, dot_evidence, independent_rays
@@ -99,7 +99,7 @@ class _Seen(ArrayRecord):
         homographies: np.ndarray,
         polarity: np.ndarray,
         scale: np.ndarray,
-        family: PointFamily,
+        family: PointPrint,
     ) -> _Seen:
         """Look at the template dots of targets."""
         part = slice(len(family.template))
@@ -112,7 +112,7 @@ class _Seen(ArrayRecord):
         ratio = _of_steps(sides, frames, polarity, ink)
         return _Seen(homographies, polarity, scale, lift, ink, levels, ratio, inside)
 
-    def further(self, log: np.ndarray, family: PointFamily, count: int) -> _Seen:
+    def further(self, log: np.ndarray, family: PointPrint, count: int) -> _Seen:
         """Look at so many further places, or at all others where these are fewer."""
         done = self.ratio.shape[1]
         part = slice(done, done + count)
@@ -130,7 +130,7 @@ class _Seen(ArrayRecord):
 
 
 def likely_templates(
-    log: np.ndarray, templates: Templates, family: PointFamily, least: float
+    log: np.ndarray, templates: Templates, family: PointPrint, least: float
 ) -> tuple[Templates, Evidence]:
     """Return the templates in the image that may be those of targets, and the evidence for dots.
 
@@ -157,7 +157,7 @@ def find_evidence(
     homographies: np.ndarray,
     polarity: np.ndarray,
     scale: np.ndarray,
-    family: PointFamily,
+    family: PointPrint,
 ) -> Evidence:
     """Return the evidence for dots at all places of k targets.
 
@@ -169,7 +169,7 @@ def find_evidence(
 
 
 def _sides(
-    log: np.ndarray, homographies: np.ndarray, scale: np.ndarray, family: PointFamily, part: slice
+    log: np.ndarray, homographies: np.ndarray, scale: np.ndarray, family: PointPrint, part: slice
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Return the frames of dots at some places, (k, n, 3, 3), and ln(I + 8) at both their sides.
 
@@ -277,7 +277,7 @@ class Readings:
 def read_codes(
     evidence: Evidence,
     scale: np.ndarray,
-    family: PointFamily,
+    family: PointPrint,
     expected: frozenset[int] = frozenset(),
 ) -> Readings:
     """Return the codes that the evidence speaks for, of those whose IDs are `expected` if any are.
@@ -310,7 +310,7 @@ def read_codes(
     )
 
 
-def _most_support(seen: _Seen, family: PointFamily) -> np.ndarray:
+def _most_support(seen: _Seen, family: PointPrint) -> np.ndarray:
     """Return bounds of the support of codes, (k,), from the evidence at the places looked at.
 
     Positions that a dot may cover, and those that were not looked at, tell nothing against any.
@@ -327,7 +327,7 @@ def _most_support(seen: _Seen, family: PointFamily) -> np.ndarray:
 
 
 @lru_cache(maxsize=8)
-def _gaps(family: PointFamily) -> np.ndarray:
+def _gaps(family: PointPrint) -> np.ndarray:
     """Return how far positions are from other places, in their radii, (places, positions)."""
     count, places, radii = len(family.template), family.places, family.radii
     gaps = np.hypot(*(places[:, None] - places[count:]).transpose(2, 0, 1))
@@ -336,7 +336,7 @@ def _gaps(family: PointFamily) -> np.ndarray:
     return np.asarray(gaps)
 
 
-def _covered(marked: np.ndarray, scale: np.ndarray, family: PointFamily) -> np.ndarray:
+def _covered(marked: np.ndarray, scale: np.ndarray, family: PointPrint) -> np.ndarray:
     """Return which positions lie within two radii of a dot, shape (k, positions)."""
     count, near = len(family.template), _gaps(family) < scale[:, None, None]
     shown = np.concatenate([np.ones((len(marked), count), bool), marked], axis=1)
@@ -344,7 +344,7 @@ def _covered(marked: np.ndarray, scale: np.ndarray, family: PointFamily) -> np.n
 
 
 @lru_cache(maxsize=8)
-def _incidence(family: PointFamily) -> np.ndarray:
+def _incidence(family: PointPrint) -> np.ndarray:
     """Return which positions each code has dots at, 0 or 1, shape (codes, positions)."""
     bits = family.words[:, None] >> family.position_numbers & 1
     return bits.astype(np.float64)

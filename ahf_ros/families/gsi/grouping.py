@@ -17,7 +17,7 @@ from itertools import pairwise
 import cv2
 import numpy as np
 
-from ahf_ros.prints.gsi import PointFamily
+from ahf_ros.prints.gsi import PointPrint
 from ahf_ros.vision import frame
 from ahf_ros.vision.array_record import ArrayRecord
 from ahf_ros.vision.dots import Dots, pairs_within
@@ -97,7 +97,7 @@ class Pairs:
 
 
 @lru_cache(maxsize=8)
-def radius_scales(family: PointFamily) -> tuple[float, float]:
+def radius_scales(family: PointPrint) -> tuple[float, float]:
     """Return the bounds of the radii that dots may have, in those of the printed design."""
     places = family.places[: len(family.template)]
     gaps = np.hypot(*(places[:, None] - places).transpose(2, 0, 1))
@@ -108,7 +108,7 @@ def radius_scales(family: PointFamily) -> tuple[float, float]:
 
 def neighbours(
     dots: Dots,
-    family: PointFamily,
+    family: PointPrint,
     triples: Sequence[tuple[int, int, int]],
     error: tuple[float, float],
     *,
@@ -216,7 +216,7 @@ class Templates(ArrayRecord):
     misfit: np.ndarray
 
 
-def find_templates(dots: Dots, family: PointFamily, *, obvious: bool = False) -> Templates:
+def find_templates(dots: Dots, family: PointPrint, *, obvious: bool = False) -> Templates:
     """Return the groups of dots that look like templates, best first, no group twice.
 
     Dots are of one polarity; groups may share them. If targets are to be obvious, those with many
@@ -266,7 +266,7 @@ def _members(
     dots: Dots,
     pairs: Pairs,
     nearest: Callable[[], Nearest],
-    family: PointFamily,
+    family: PointPrint,
     triple: tuple[int, int, int],
 ) -> np.ndarray:
     """Return groups of dots in which a dot has a role, shape (k, n), -1 where one is missing."""
@@ -351,7 +351,7 @@ def _bears_out(
     dots: Dots,
     members: np.ndarray,
     affine: np.ndarray,
-    family: PointFamily,
+    family: PointPrint,
     roles: tuple[int, int, int],
 ) -> np.ndarray:
     """Return where the ellipses of three dots are those that their affine map implies.
@@ -380,7 +380,7 @@ def _cross(first: np.ndarray, second: np.ndarray) -> np.ndarray:
     return first[..., 0] * second[..., 1] - first[..., 1] * second[..., 0]
 
 
-def _fitted(dots: Dots, members: np.ndarray, family: PointFamily) -> Templates:
+def _fitted(dots: Dots, members: np.ndarray, family: PointPrint) -> Templates:
     """Return groups with their homographies, those that fit."""
     places = family.places[: len(family.template)]
     reach = np.hypot(*places.T).max()
@@ -405,7 +405,7 @@ def _fitted(dots: Dots, members: np.ndarray, family: PointFamily) -> Templates:
     ).select(good)
 
 
-def _mostly_empty(templates: Templates, nearest: Nearest, family: PointFamily) -> np.ndarray:
+def _mostly_empty(templates: Templates, nearest: Nearest, family: PointPrint) -> np.ndarray:
     """Return where not many more positions than those of a code have a dot nearby."""
     count = len(family.template)
     frames = local_frames(templates.homographies, family.places[count:], family.radii[count:])

@@ -15,7 +15,7 @@ from ahf_ros.families.claims import Rivals, owners
 from ahf_ros.families.gsi.evidence import Readings
 from ahf_ros.families.gsi.grouping import Templates
 from ahf_ros.families.gsi.refinement import Placement
-from ahf_ros.prints.gsi import PointFamily
+from ahf_ros.prints.gsi import PointPrint
 from ahf_ros.vision.array_record import ArrayRecord
 from ahf_ros.vision.frame import ellipse_axes
 from ahf_ros.vision.homography import reference_frames
@@ -93,7 +93,7 @@ NO_HYPOTHESES = Hypotheses(
 
 
 def confidence_features(
-    placement: Placement, readings: Readings, family: PointFamily
+    placement: Placement, readings: Readings, family: PointPrint
 ) -> np.ndarray:
     """Return what tells targets from chance arrangements, and right codes from wrong ones.
 
@@ -131,7 +131,7 @@ def least_support(*, obvious: bool) -> float:
 
 
 def plausible(
-    templates: Templates, readings: Readings, family: PointFamily, *, obvious: bool
+    templates: Templates, readings: Readings, family: PointPrint, *, obvious: bool
 ) -> np.ndarray:
     """Return the indices of the groups that are followed up, of equal ones one.
 
@@ -154,7 +154,7 @@ def plausible(
     return order[owners(len(order), rivals)][:_MAXIMUM]
 
 
-def resolve(hypotheses: Hypotheses, family: PointFamily, minimum: float = CERTAIN) -> np.ndarray:
+def resolve(hypotheses: Hypotheses, family: PointPrint, minimum: float = CERTAIN) -> np.ndarray:
     """Return the indices of hypotheses with a minimum of confidence, the best of each place."""
     confidence = hypotheses.confidence
     order = np.argsort(-confidence, kind='stable')

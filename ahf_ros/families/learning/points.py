@@ -12,7 +12,7 @@ from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 
-from ahf_ros.prints.gsi import PointFamily, positions_of, value_of
+from ahf_ros.prints.gsi import PointPrint, positions_of, value_of
 
 _REFERENCE_LABEL = re.compile(r'CODE(\d+)')
 _DOT_LABEL = re.compile(r'NUGGET(\d+)_(\w+)')
@@ -44,13 +44,13 @@ class Learnt:
     were not used.
     """
 
-    family: PointFamily
+    family: PointPrint
     codes: dict[int, int]
     targets: tuple[MeasuredTarget, ...]
     left_out: dict[int, str]
 
 
-def learn_family(points: Mapping[str, np.ndarray], base: PointFamily, name: str) -> Learnt:
+def learn_family(points: Mapping[str, np.ndarray], base: PointPrint, name: str) -> Learnt:
     """Learn a family from the coordinates of the dots of its targets.
 
     Each target is laid into its plane and turned so that its template lies on the template of
@@ -63,7 +63,7 @@ def learn_family(points: Mapping[str, np.ndarray], base: PointFamily, name: str)
         Coordinates by label, as V-STARS writes them: CODEn is the reference point of target n,
         NUGGETn_A the template dot A, NUGGETn_7 the decoding dot at position 7. Other labels are
         left alone.
-    base : PointFamily
+    base : PointPrint
         Design with the names of the template dots and about their places, at any scale. Positions
         that no target shows are taken from it.
     name : str
@@ -106,7 +106,7 @@ def learn_family(points: Mapping[str, np.ndarray], base: PointFamily, name: str)
     )
 
 
-def with_codes(family: PointFamily, codes: dict[int, int]) -> PointFamily:
+def with_codes(family: PointPrint, codes: dict[int, int]) -> PointPrint:
     """Return a family that lists more codes, values by ID.
 
     They take the place of listed codes that have the same ID or value.
@@ -127,7 +127,7 @@ def with_codes(family: PointFamily, codes: dict[int, int]) -> PointFamily:
     return replace(family, words=words, numbers=numbers, rule=rule)
 
 
-def library_text(family: PointFamily) -> str:
+def library_text(family: PointPrint) -> str:
     """Return the data file that describes a family, one dot or code a line."""
 
     def block(name: str, table: Mapping[str, Sequence[float]]) -> str:
@@ -162,12 +162,12 @@ def library_text(family: PointFamily) -> str:
     return '{\n' + ',\n'.join(parts) + '\n}\n'
 
 
-def _reference_name(family: PointFamily) -> str:
+def _reference_name(family: PointPrint) -> str:
     return family.template_names[family.reference]
 
 
 def _grouped(
-    points: Mapping[str, np.ndarray], base: PointFamily
+    points: Mapping[str, np.ndarray], base: PointPrint
 ) -> dict[int, dict[str, np.ndarray]]:
     """Return the dots of each target by their names."""
     grouped: dict[int, dict[str, np.ndarray]] = {}
@@ -183,7 +183,7 @@ def _grouped(
     return {number: dots for number, dots in grouped.items() if len(dots) > 1}
 
 
-def _measured(number: int, dots: dict[str, np.ndarray], base: PointFamily) -> MeasuredTarget:
+def _measured(number: int, dots: dict[str, np.ndarray], base: PointPrint) -> MeasuredTarget:
     """Return a target laid onto the design; refuse one that is not complete or does not fit."""
     missing = [name for name in base.template_names if name not in dots]
     if missing:
@@ -233,7 +233,7 @@ def _laid(points: np.ndarray, design: np.ndarray, which: np.ndarray) -> tuple[np
     return (points - middle) * turn + wanted, float(abs(turn))
 
 
-def _averaged(targets: list[MeasuredTarget], base: PointFamily, name: str) -> PointFamily:
+def _averaged(targets: list[MeasuredTarget], base: PointPrint, name: str) -> PointPrint:
     """Return the mean design, with the positions of the base that no target shows."""
     scale = float(np.mean([target.scale for target in targets]))
     template = np.mean([target.template for target in targets], axis=0) / scale

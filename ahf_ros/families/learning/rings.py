@@ -25,7 +25,7 @@ from ahf_ros.families.ring.bands import (
 )
 from ahf_ros.prints import RING_NAMES
 from ahf_ros.prints.cyclic import smallest_rotation
-from ahf_ros.prints.ring import BITS, Family, conforming, family
+from ahf_ros.prints.ring import BITS, RingPrint, conforming, family
 
 Rules = dict[str, Any]
 """Arguments of `conforming`."""
@@ -73,7 +73,7 @@ class LearntFamily:
         seen = np.median(of.pinhole) > _PINHOLE
         return max(float(printed), _PINHOLE) if seen else 0.0
 
-    def known(self, more: Sequence[Family] = ()) -> list[str]:
+    def known(self, more: Sequence[RingPrint] = ()) -> list[str]:
         """Return the families of this package, and more, of these words and radii, sorted."""
         codes = sorted([*map(family, RING_NAMES), *more], key=lambda code: len(code.words))
         return [

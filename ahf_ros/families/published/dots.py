@@ -23,7 +23,7 @@ import numpy as np
 from ahf_ros.base.target import UNDECODED, Target, sorted_targets
 from ahf_ros.families.claims import best_targets
 from ahf_ros.families.contract import DetectorSettings, FamilyDetector
-from ahf_ros.prints.dots import DotFamily
+from ahf_ros.prints.dots import DotRingPrint
 from ahf_ros.vision.ellipse_targets import targets_from_frames
 from ahf_ros.vision.frame import affine_frames, circle_points, project
 from ahf_ros.vision.image import check_image, stretched_to_8_bit
@@ -117,9 +117,9 @@ class PublishedDotsDetector(FamilyDetector):
     name: ClassVar[str] = 'dots_published'
 
     @property
-    def design(self) -> DotFamily:
+    def design(self) -> DotRingPrint:
         """Printed design of the family."""
-        return self.settings.codes(DotFamily)[0]
+        return self.settings.codes(DotRingPrint)[0]
 
     def __call__(self, image: np.ndarray) -> list[Target]:
         """Identify the targets of one image; see `Detector`.
@@ -145,7 +145,7 @@ class PublishedDotsDetector(FamilyDetector):
 
 
 def _concentric(
-    mask: np.ndarray, settings: DetectorSettings, code: DotFamily
+    mask: np.ndarray, settings: DetectorSettings, code: DotRingPrint
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the targets that regions of a mask look like.
 
@@ -187,7 +187,7 @@ def _ellipse(contour: np.ndarray, shift: float) -> tuple[float, ...] | None:
     return x, y, width / 2 + shift, height / 2 + shift, float(np.deg2rad(angle))
 
 
-def _matches(disc: tuple[float, ...], outer: tuple[float, ...], code: DotFamily) -> bool:
+def _matches(disc: tuple[float, ...], outer: tuple[float, ...], code: DotRingPrint) -> bool:
     """Return whether two ellipses have the centres and the sizes of the circles of a target."""
     ratios = np.divide(sorted(outer[2:4]), sorted(disc[2:4])) / code.ground_radius
     distance = np.hypot(outer[0] - disc[0], outer[1] - disc[1])
@@ -196,7 +196,7 @@ def _matches(disc: tuple[float, ...], outer: tuple[float, ...], code: DotFamily)
 
 
 def _identified(
-    height: np.ndarray, frames: np.ndarray, points: np.ndarray, code: DotFamily
+    height: np.ndarray, frames: np.ndarray, points: np.ndarray, code: DotRingPrint
 ) -> list[Target]:
     """Return the targets that a threshold shows, undecoded where a place is neither 01 nor 11.
 
@@ -215,7 +215,7 @@ def _identified(
 
 
 def _develop(
-    height: np.ndarray, frames: np.ndarray, code: DotFamily
+    height: np.ndarray, frames: np.ndarray, code: DotRingPrint
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Read the rings between the two circles, unrolled into rectangles.
 

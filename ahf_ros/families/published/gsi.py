@@ -34,7 +34,7 @@ import numpy as np
 from ahf_ros.base.target import UNDECODED, DottedTarget, Target, sorted_targets
 from ahf_ros.families.claims import best_targets
 from ahf_ros.families.contract import FamilyDetector
-from ahf_ros.prints.gsi import PointFamily
+from ahf_ros.prints.gsi import PointPrint
 from ahf_ros.vision.array_record import ArrayRecord
 from ahf_ros.vision.image import as_gray, check_image
 
@@ -124,7 +124,7 @@ class Decoded(ArrayRecord):
     bias: np.ndarray
 
 
-def decode(points: np.ndarray, code: PointFamily) -> Decoded:
+def decode(points: np.ndarray, code: PointPrint) -> Decoded:
     """Return the targets that points, shape (k, 2), px, belong to.
 
     Of those with the same middle dot it is the one that fits best.
@@ -162,7 +162,7 @@ def _nearest(points: np.ndarray) -> np.ndarray:
     return np.concatenate(groups)
 
 
-def _templates(points: np.ndarray, groups: np.ndarray, code: PointFamily) -> list[np.ndarray]:
+def _templates(points: np.ndarray, groups: np.ndarray, code: PointPrint) -> list[np.ndarray]:
     """Return members of targets as `Decoded` has them, from groups whose first dot is E."""
     wanted = float(template_invariant(code.template[_roles(code)]))
     found = []
@@ -192,7 +192,7 @@ def _templates(points: np.ndarray, groups: np.ndarray, code: PointFamily) -> lis
     return found
 
 
-def _roles(code: PointFamily) -> list[int]:
+def _roles(code: PointPrint) -> list[int]:
     """Return the indices of A, B, C, D and E among the template dots."""
     return [code.template_names.index(name) for name in 'ABCDE']
 
@@ -208,9 +208,9 @@ class PublishedGsiDetector(FamilyDetector):
     name: ClassVar[str] = 'gsi_published'
 
     @property
-    def design(self) -> PointFamily:
+    def design(self) -> PointPrint:
         """Printed design of the family, which has to have what the method rests on."""
-        code = self.settings.codes(PointFamily)[0]
+        code = self.settings.codes(PointPrint)[0]
         good = sorted(code.template_names) == list('ABCDE') and code.rule.dots == _DOTS - 5
         if good:
             c, e, a = (code.template[code.template_names.index(name)] for name in 'CEA')

@@ -31,7 +31,7 @@ from ahf_ros.families.claims import best_targets
 from ahf_ros.families.contract import DetectorSettings, FamilyDetector
 from ahf_ros.families.ring.circles import REACH, target_circles
 from ahf_ros.families.ring.refinement import refine_centres
-from ahf_ros.prints.ring import Family
+from ahf_ros.prints.ring import RingPrint
 from ahf_ros.vision.array_record import ArrayRecord
 from ahf_ros.vision.circle_fit import fit_circles, fit_dots
 from ahf_ros.vision.ellipse_targets import targets_from_frames
@@ -130,9 +130,9 @@ class TraditionalDetector(FamilyDetector):
     name: ClassVar[str] = 'traditional'
 
     @property
-    def design(self) -> Family:
+    def design(self) -> RingPrint:
         """Words and radii of the family."""
-        return self.settings.codes(Family)[0]
+        return self.settings.codes(RingPrint)[0]
 
     @one_blas_thread()
     def __call__(self, image: np.ndarray) -> list[Target]:
@@ -169,7 +169,7 @@ def _identify_dots(
     gray: np.ndarray, frames: np.ndarray, polarity: int, settings: DetectorSettings
 ) -> list[Target]:
     """Return the targets among dots, undecoded where they have no code word."""
-    code = settings.codes(Family)[0]
+    code = settings.codes(RingPrint)[0]
     signs = np.full(len(frames), polarity)
     fit = fit_dots(gray, frames, signs, rays=_RAYS, reach=REACH)
     fit = fit.select(fit.share >= _MINIMUM_SHARE)
@@ -203,7 +203,7 @@ def _identify_dots(
     )
 
 
-def _resolve(targets: list[Target], code: Family) -> list[Target]:
+def _resolve(targets: list[Target], code: RingPrint) -> list[Target]:
     """Return the targets with each ID left to the most certain of those that claim it.
 
     Undecoded blobs in the band of a decoded target are its sectors and are dropped.
@@ -244,7 +244,7 @@ class BandReadings(ArrayRecord):
 
 
 def _read_by_level(
-    gray: np.ndarray, frames: np.ndarray, polarity: int, code: Family
+    gray: np.ndarray, frames: np.ndarray, polarity: int, code: RingPrint
 ) -> BandReadings:
     """Read the bands of targets of one polarity: ink is what is darker than their darkest ground.
 

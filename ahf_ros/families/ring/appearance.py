@@ -13,7 +13,7 @@ import numpy as np
 from ahf_ros.families.ring.decoding import Words, bits_at, lengthened
 from ahf_ros.families.ring.light import clear_of
 from ahf_ros.families.ring.polar import LIGHT_EDGE, SOFT_EDGE, PolarImages, angles_of
-from ahf_ros.prints.ring import Family
+from ahf_ros.prints.ring import RingPrint
 from ahf_ros.vision.logarithm import LOG_OFFSET
 from ahf_ros.vision.robust import fit_linear
 
@@ -29,7 +29,7 @@ _OF_MARKS = 1 / 3  # of all sectors, that are as unlike as all marks
 
 
 def unlike_print(
-    polar: PolarImages, words: Words, growth: np.ndarray, overhang: np.ndarray, family: Family
+    polar: PolarImages, words: Words, growth: np.ndarray, overhang: np.ndarray, family: RingPrint
 ) -> np.ndarray:
     """Return the shares of sectors in which targets are not what their words print, (k,).
 

@@ -22,7 +22,7 @@ from ahf_ros.families.claims import owners
 from ahf_ros.families.contract import DetectorSettings
 from ahf_ros.families.ring.polar import angles_of
 from ahf_ros.prints import RING_NAMES
-from ahf_ros.prints.ring import Family, Radii
+from ahf_ros.prints.ring import Radii, RingPrint
 from ahf_ros.vision import frame
 from ahf_ros.vision.array_record import ArrayRecord
 from ahf_ros.vision.circle_fit import ENOUGH, NO_FITS, Fit, fit_dots
@@ -149,8 +149,8 @@ def _fit(image: np.ndarray, dots: Dots | Fit) -> Fit:
 
 
 def with_measured_bands(
-    gray: np.ndarray, dots: Dots | Fit, families: Sequence[Family]
-) -> Sequence[Family]:
+    gray: np.ndarray, dots: Dots | Fit, families: Sequence[RingPrint]
+) -> Sequence[RingPrint]:
     """Return families of which those with a free band have the one that clear dots show.
 
     A family stays as it is where these are few. Radii are rounded, so that few families are made.
@@ -165,7 +165,7 @@ def with_measured_bands(
     ]
 
 
-def _measured(bands: Bands, code: Family, inner: Radii, outer: Radii) -> Family:
+def _measured(bands: Bands, code: RingPrint, inner: Radii, outer: Radii) -> RingPrint:
     """Return a family with the band that some of the bands have within bounds of its radii."""
     near = (bands.inner > inner[0] - _LOOSE) & (bands.inner < inner[1] + _LOOSE)
     near &= (bands.outer > outer[0] - _LOOSE) & (bands.outer < outer[1] + _LOOSE)
@@ -178,7 +178,7 @@ def _measured(bands: Bands, code: Family, inner: Radii, outer: Radii) -> Family:
 
 
 @lru_cache(maxsize=64)
-def _with_band(code: Family, inner: float, outer: float) -> Family:
+def _with_band(code: RingPrint, inner: float, outer: float) -> RingPrint:
     return replace(code, band_inner=inner, band_outer=outer, bounds=None)
 
 

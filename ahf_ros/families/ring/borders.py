@@ -15,7 +15,7 @@ import numpy as np
 from ahf_ros.families.ring.decoding import Words, bits_at
 from ahf_ros.families.ring.likelihood import normal
 from ahf_ros.families.ring.polar import DEPTHS, PolarImages
-from ahf_ros.prints.ring import Family
+from ahf_ros.prints.ring import RingPrint
 from ahf_ros.vision.logarithm import LOG_OFFSET
 from ahf_ros.vision.robust import fit_linear, median
 
@@ -29,7 +29,7 @@ _ROBUST = 0.5  # distance of ends, angles, of which a quarter is left
 _RARE = 12.0  # log odds of a cover against a word that no family has
 
 
-def with_ends(polar: PolarImages, words: Words, overhang: np.ndarray, family: Family) -> Words:
+def with_ends(polar: PolarImages, words: Words, overhang: np.ndarray, family: RingPrint) -> Words:
     """Return words with the evidence of where their arcs end, and the margin that this leaves.
 
     `overhang`, shape (k,), is by how many angles ink is longer at either end than its sectors. A
@@ -47,7 +47,7 @@ def with_ends(polar: PolarImages, words: Words, overhang: np.ndarray, family: Fa
 
 
 def _ends(
-    polar: PolarImages, levels: np.ndarray, words: Words, overhang: np.ndarray, family: Family
+    polar: PolarImages, levels: np.ndarray, words: Words, overhang: np.ndarray, family: RingPrint
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the log odds that arcs end where the sectors do, against anywhere near, shape (k,).
 

@@ -17,7 +17,7 @@ from ahf_ros.families.ring.hypotheses import Hypotheses
 from ahf_ros.families.ring.proposals import HOPEFUL, Print, bounds, measure_likely
 from ahf_ros.families.ring.reading import read_bands
 from ahf_ros.families.ring.rivals import has_all
-from ahf_ros.prints.ring import Family
+from ahf_ros.prints.ring import RingPrint
 from ahf_ros.vision.circle_fit import ENOUGH, Fit
 
 _CLEAREST = 32  # dots that tell the family of an image
@@ -32,7 +32,7 @@ _NEARLY = 0.05  # mean evidence of a reading, by which a print is as good as the
 _PRINTS = 4  # the most likely ones, which are tried on the same dots
 
 
-def choose_families(gray: np.ndarray, dots: Fit, families: Sequence[Family]) -> list[Family]:
+def choose_families(gray: np.ndarray, dots: Fit, families: Sequence[RingPrint]) -> list[RingPrint]:
     """Return as few of some families as have all words of the print that the clearest dots show.
 
     Only their likeliest print is tried, on the likeliest of them.
@@ -41,7 +41,9 @@ def choose_families(gray: np.ndarray, dots: Fit, families: Sequence[Family]) -> 
     return present_families(_words_shown(gray, clearest, families, tried=1, most=_SAMPLE))[0]
 
 
-def further_families(gray: np.ndarray, dots: Fit, families: Sequence[Family]) -> list[Family]:
+def further_families(
+    gray: np.ndarray, dots: Fit, families: Sequence[RingPrint]
+) -> list[RingPrint]:
     """Return the same for dots that no family explains, most of which are none of targets."""
     dots = dots.select(dots.share >= ENOUGH)
     dots = dots.select(dots.clearest(_OTHERS))
@@ -56,10 +58,10 @@ def further_families(gray: np.ndarray, dots: Fit, families: Sequence[Family]) ->
 def _words_shown(
     gray: np.ndarray,
     dots: Fit,
-    families: Sequence[Family],
+    families: Sequence[RingPrint],
     tried: int = _PRINTS,
     most: int = _LIKELIEST,
-) -> list[dict[Family, int]]:
+) -> list[dict[RingPrint, int]]:
     """Return words of the likeliest print of some dots that has any, by family.
 
     So many prints are tried at the most, on so many of the likeliest dots, of the likeliest print
@@ -108,7 +110,7 @@ def _likeliest(prints: Sequence[Print], mean: np.ndarray) -> list[int]:
     return list(dict.fromkeys([of_all[0], *of_best]))
 
 
-def _read(gray: np.ndarray, dots: Fit, families: Sequence[Family]) -> Hypotheses:
+def _read(gray: np.ndarray, dots: Fit, families: Sequence[RingPrint]) -> Hypotheses:
     """Return the words of dots, by those of some families that explain their bands best.
 
     Families that have all words of others are read first. Where they find nothing conceivable,

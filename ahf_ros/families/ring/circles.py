@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ahf_ros.prints.ring import Family
+from ahf_ros.prints.ring import RingPrint
 from ahf_ros.vision.circle_fit import on_circles
 from ahf_ros.vision.edge_fit import Outlines
 
@@ -20,7 +20,7 @@ RAYS = 48
 _INNER_PART = 0.4  # of a sector, to either side; next to its ends the blur rounds an arc off
 
 
-def reach_of(family: Family) -> float:
+def reach_of(family: RingPrint) -> float:
     """Return how far to look for the edges of a target, dot radii: not to the next edge."""
     inner, outer = family.band
     return min(REACH, (inner - 1) / 2, (outer - inner) / 2)
@@ -31,7 +31,7 @@ def target_circles(
     starts: np.ndarray,
     polarity: np.ndarray,
     samples: int,
-    family: Family,
+    family: RingPrint,
 ) -> Outlines:
     """Return the edges of k targets, with some points a sector on each edge of the band.
 

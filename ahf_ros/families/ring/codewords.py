@@ -7,7 +7,7 @@ from functools import cache, lru_cache
 import numpy as np
 
 from ahf_ros.prints.cyclic import rotated_words
-from ahf_ros.prints.ring import Family
+from ahf_ros.prints.ring import RingPrint
 
 _EXHAUSTIVE = 50_000  # rotations of words, up to which all of them compete
 _MINIMUM_EVIDENCE = 0.5  # for ones, in units of ln
@@ -23,7 +23,7 @@ _UNEXPECTED = 25.0  # evidence against words that are not expected, more than fo
 def best_words(
     ones: np.ndarray,
     pairs: np.ndarray,
-    family: Family,
+    family: RingPrint,
     expected: frozenset[int] = frozenset(),
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the valid words with the most evidence, and the best phase of each.
@@ -109,7 +109,7 @@ def _best(scores: np.ndarray, count: int) -> np.ndarray:
     return np.resize(np.take_along_axis(best, order, 1).T, (count, len(scores))).T
 
 
-def prior(words: np.ndarray, family: Family, expected: frozenset[int]) -> np.ndarray:
+def prior(words: np.ndarray, family: RingPrint, expected: frozenset[int]) -> np.ndarray:
     """Return the evidence for words in any rotation before they are read, float32, of their shape.
 
     `expected` are the IDs that are likely. Empty: all IDs are equally likely.
@@ -121,13 +121,13 @@ def prior(words: np.ndarray, family: Family, expected: frozenset[int]) -> np.nda
 
 
 @cache
-def _all_rotations(family: Family) -> tuple[np.ndarray, np.ndarray]:
+def _all_rotations(family: RingPrint) -> tuple[np.ndarray, np.ndarray]:
     """Return all rotations of all words, and what they show."""
     return _with_bits(_rotated(family.words, family), family.bits)
 
 
 def _near_rotations(
-    sectors: np.ndarray, family: Family, expected: frozenset[int]
+    sectors: np.ndarray, family: RingPrint, expected: frozenset[int]
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the words near to what the sectors say at any of the phases, and what they show.
 
@@ -153,7 +153,7 @@ def _choices() -> np.ndarray:
 
 
 @lru_cache(maxsize=8)
-def _are_words(family: Family) -> np.ndarray:
+def _are_words(family: RingPrint) -> np.ndarray:
     """Return whether numbers are rotations of words, (2^bits,)."""
     words = np.zeros(1 << family.bits, bool)
     for turn in range(family.bits):
@@ -162,12 +162,12 @@ def _are_words(family: Family) -> np.ndarray:
 
 
 @lru_cache(maxsize=8)
-def _expected_rotations(family: Family, numbers: frozenset[int]) -> np.ndarray:
+def _expected_rotations(family: RingPrint, numbers: frozenset[int]) -> np.ndarray:
     """Return all rotations of the words with some IDs, ascending."""
     return _rotated(family.words[np.isin(family.numbers, list(numbers))], family)
 
 
-def _rotated(words: np.ndarray, family: Family) -> np.ndarray:
+def _rotated(words: np.ndarray, family: RingPrint) -> np.ndarray:
     """Return all rotations of words, ascending."""
     turns = [rotated_words(words, turn, family.bits) for turn in range(family.bits)]
     return np.unique(turns)

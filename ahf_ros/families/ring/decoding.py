@@ -16,7 +16,7 @@ import numpy as np
 from ahf_ros.families.ring.codewords import best_words, likeliest_bits, prior
 from ahf_ros.families.ring.likelihood import SURPRISES, Evidence
 from ahf_ros.families.words import margins
-from ahf_ros.prints.ring import Family, canonical
+from ahf_ros.prints.ring import RingPrint, canonical
 from ahf_ros.vision.array_record import ArrayRecord
 from ahf_ros.vision.normal import normal_integral
 
@@ -117,7 +117,7 @@ class Words(ArrayRecord):
 def decode(
     evidence: Evidence,
     overhang: np.ndarray,
-    family: Family,
+    family: RingPrint,
     expected: frozenset[int] = frozenset(),
     *,
     arcs: bool = True,
@@ -209,7 +209,7 @@ class _Bands:
     """Bands that are decoded, and the same from those angles on at which they are seen best."""
 
     some: Evidence
-    family: Family
+    family: RingPrint
     ends: tuple[np.ndarray, np.ndarray]  # see `spread_ends`
     order: np.ndarray  # (k, m), angles of the band at those of `turned`
     turned: Evidence
@@ -218,7 +218,7 @@ class _Bands:
     on_mark: np.ndarray  # ... on a mark
 
     @classmethod
-    def of(cls, raw: Evidence, some: Evidence, overhang: np.ndarray, family: Family) -> _Bands:
+    def of(cls, raw: Evidence, some: Evidence, overhang: np.ndarray, family: RingPrint) -> _Bands:
         """Return bands, from their evidence with and `without_outliers`."""
         order = _clearest(some)
 
@@ -271,7 +271,7 @@ class _Bands:
 
 
 def _as_it_looks(
-    ones: np.ndarray, pairs: np.ndarray, phase: np.ndarray, family: Family
+    ones: np.ndarray, pairs: np.ndarray, phase: np.ndarray, family: RingPrint
 ) -> np.ndarray:
     """Return the words that sectors look like at phases, shape (k,), of any family or of none.
 
@@ -355,7 +355,7 @@ def _prices(of: Evidence) -> np.ndarray:
 
 
 def _of_sectors(
-    ranked: np.ndarray, overhang: np.ndarray, blur: np.ndarray, family: Family
+    ranked: np.ndarray, overhang: np.ndarray, blur: np.ndarray, family: RingPrint
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the evidence for ones over zeros, and for pairs, as `best_words` takes it.
 
@@ -387,7 +387,9 @@ def spread_ends(
     return rising, falling
 
 
-def bits_at(words: np.ndarray, phases: np.ndarray, per_sector: int, family: Family) -> np.ndarray:
+def bits_at(
+    words: np.ndarray, phases: np.ndarray, per_sector: int, family: RingPrint
+) -> np.ndarray:
     """Return whether words have a mark at each angle, by their phases, (...), bool, (..., m)."""
     count = family.bits * per_sector
     sector = (np.arange(count) - phases[..., None]) % count // per_sector
@@ -422,7 +424,7 @@ def _steps(
     phases: np.ndarray,
     ends: tuple[np.ndarray, np.ndarray],
     of: Evidence,
-    family: Family,
+    family: RingPrint,
 ) -> np.ndarray:
     """Return the shares of ink that words show at each angle, in steps of `Evidence.between`.
 
@@ -555,7 +557,7 @@ def _of_borders(
     hidden: np.ndarray,
     of_arcs: np.ndarray,
     price: np.ndarray,
-    family: Family,
+    family: RingPrint,
 ) -> np.ndarray:
     """Return what the borders of words cost, from what is mixed and hidden, (k, m), shape (k,).
 

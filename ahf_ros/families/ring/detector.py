@@ -40,7 +40,7 @@ from ahf_ros.families.ring.proposals import (
 )
 from ahf_ros.families.ring.refinement import refine_centres
 from ahf_ros.families.undecoded import undecoded
-from ahf_ros.prints.ring import Family
+from ahf_ros.prints.ring import RingPrint
 from ahf_ros.vision import frame
 from ahf_ros.vision.circle_fit import NO_FITS, Fit
 from ahf_ros.vision.ellipse_targets import targets_from_frames
@@ -59,9 +59,9 @@ class RingDetector(PyramidDetector):
     patience: ClassVar[int] = 2
 
     @property
-    def design(self) -> tuple[Family, ...]:
+    def design(self) -> tuple[RingPrint, ...]:
         """Printed designs of the families."""
-        return self.settings.codes(Family)
+        return self.settings.codes(RingPrint)
 
     def search(self, pyramid: ImagePyramid) -> list[Target]:
         """Identify the targets of one image; see `Searching`."""
@@ -158,14 +158,14 @@ def read_pyramid(
     settings: DetectorSettings,
     expected: frozenset[int],
     proposals: Sequence[Proposal],
-    shown: Sequence[Family] = (),
+    shown: Sequence[RingPrint] = (),
 ) -> Hypotheses:
     """Find the dots and words in an image pyramid; see `read_image`.
 
     Without families that are known to be shown, a glance at the clearest dots tells them, or a
     closer look in the end. Dots that were left unread until then are read with these.
     """
-    described: Sequence[Family] = settings.codes(Family)
+    described: Sequence[RingPrint] = settings.codes(RingPrint)
     families, polarities = described, settings.polarities
     shown = list(families if len(families) == 1 else shown)
     images = pyramid.images
@@ -225,7 +225,7 @@ def read_pyramid(
 def _with_alike(
     octave: Octave,
     images: Sequence[np.ndarray],
-    codes: Sequence[Family],
+    codes: Sequence[RingPrint],
     seen: _Seen,
     expected: frozenset[int],
 ) -> _Seen:
@@ -248,7 +248,7 @@ def _read(
     octave: Octave,
     images: Sequence[np.ndarray],
     dots: Fit,
-    codes: Sequence[Family],
+    codes: Sequence[RingPrint],
     seen: _Seen,
     expected: frozenset[int],
     *,
@@ -300,7 +300,7 @@ def report(
     whole = settings.report_undecoded & (hypotheses.share >= WHOLE)
     of_size = settings.of_size(major)
     hypotheses = among_others(hypotheses.select(of_size))
-    hypotheses = settle_same_prints(hypotheses, settings.codes(Family))
+    hypotheses = settle_same_prints(hypotheses, settings.codes(RingPrint))
     whole = whole[of_size]
     hypotheses = hypotheses.select(hypotheses.certain | whole)
     hypotheses = hypotheses.select(np.argsort(-hypotheses.confidence, kind='stable'))

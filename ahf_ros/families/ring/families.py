@@ -19,7 +19,7 @@ from ahf_ros.families.ring.hypotheses import Hypotheses
 from ahf_ros.families.ring.known import NOTHING_KNOWN, Prior
 from ahf_ros.families.ring.reading import read_bands
 from ahf_ros.families.ring.rivals import against_rivals, has_all, odds
-from ahf_ros.prints.ring import Family, canonical, words_of_prints
+from ahf_ros.prints.ring import RingPrint, canonical, words_of_prints
 from ahf_ros.vision import frame
 from ahf_ros.vision.circle_fit import Fit
 
@@ -30,7 +30,7 @@ _ALL_WORDS = 0.5  # odds of a family of all words against one of a rule, before 
 def read_families(
     gray: np.ndarray,
     dots: Fit,
-    families: Sequence[Family],
+    families: Sequence[RingPrint],
     prior: Prior = NOTHING_KNOWN,
 ) -> Hypotheses:
     """Return what the bands about dots are read as, at least one hypothesis of each dot.
@@ -50,7 +50,7 @@ def read_families(
     return contested(Hypotheses.joined(parts))
 
 
-def _narrowest(words: dict[Family, int]) -> dict[Family, int]:
+def _narrowest(words: dict[RingPrint, int]) -> dict[RingPrint, int]:
     """Return words of a print without those of families that have all words of another one."""
     return {
         code: word
@@ -82,17 +82,19 @@ def decoded(hypotheses: Hypotheses) -> tuple[np.ndarray, np.ndarray, np.ndarray]
     return names, codes, ids
 
 
-def words_shown(hypotheses: Hypotheses, families: Sequence[Family]) -> list[dict[Family, int]]:
+def words_shown(
+    hypotheses: Hypotheses, families: Sequence[RingPrint]
+) -> list[dict[RingPrint, int]]:
     """Return the words that the prints of k readings are, by those of some families."""
     codes = decoded(hypotheses)[1]
-    prints: dict[int, dict[Family, int]] = {}
+    prints: dict[int, dict[RingPrint, int]] = {}
     for code in dict.fromkeys(hypotheses.families):
         own = np.flatnonzero(hypotheses.families == code)
         prints |= zip(own.tolist(), words_of_prints(code, codes[own], families), strict=True)
     return [prints[index] for index in sorted(prints)]
 
 
-def settle_same_prints(hypotheses: Hypotheses, families: Sequence[Family]) -> Hypotheses:
+def settle_same_prints(hypotheses: Hypotheses, families: Sequence[RingPrint]) -> Hypotheses:
     """Assign prints shared by several families to one of them, or mark them uncertain.
 
     Where two families of an image have a print, it is of the one whose words the other has all, or
@@ -128,7 +130,9 @@ def settle_same_prints(hypotheses: Hypotheses, families: Sequence[Family]) -> Hy
     return replace(hypotheses, words=words, confidence=confidence, families=of_families)
 
 
-def present_families(prints: Sequence[dict[Family, int]]) -> tuple[list[Family], set[Family]]:
+def present_families(
+    prints: Sequence[dict[RingPrint, int]],
+) -> tuple[list[RingPrint], set[RingPrint]]:
     """Return the families that say all prints in the fewest nats, and those that are sure.
 
     No other may stand for these. A print costs the logarithm of the number of words of its family,
@@ -161,7 +165,7 @@ def present_families(prints: Sequence[dict[Family, int]]) -> tuple[list[Family],
     return present, sure
 
 
-def _before(code: Family) -> float:
+def _before(code: RingPrint) -> float:
     """Return the odds of a family before any print is seen."""
     return _ALL_WORDS if code.has_all_words else 1.0
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ahf_ros.families.ring.decoding import Words
-from ahf_ros.prints.ring import Family
+from ahf_ros.prints.ring import RingPrint
 from ahf_ros.vision import frame
 from ahf_ros.vision.array_record import ArrayRecord
 from ahf_ros.vision.circle_fit import Fit
@@ -104,7 +104,7 @@ class Hypotheses(ArrayRecord):
         return np.asarray((np.hypot(away[..., 0], away[..., 1]) < radii).any(axis=1))
 
     @staticmethod
-    def of(fit: Fit, words: Words, family: Family) -> Hypotheses:
+    def of(fit: Fit, words: Words, family: RingPrint) -> Hypotheses:
         """Return words and the frames that were fitted to them, not rated yet."""
         return Hypotheses(
             frames=fit.frames,
@@ -129,6 +129,6 @@ class Hypotheses(ArrayRecord):
         )
 
     @staticmethod
-    def unread(dots: Fit, family: Family) -> Hypotheses:
+    def unread(dots: Fit, family: RingPrint) -> Hypotheses:
         """Return dots without words."""
         return Hypotheses.of(dots, Words.none(len(dots.frames)), family)

@@ -27,7 +27,7 @@ from ahf_ros.families.ring.polar import (
     on_dark_ground,
     polar_images,
 )
-from ahf_ros.prints.ring import Family, least_marked
+from ahf_ros.prints.ring import RingPrint, least_marked
 from ahf_ros.vision import frame
 from ahf_ros.vision.circle_fit import ENOUGH, NO_FITS, Fit, fit_dots
 from ahf_ros.vision.dot_search import voted_dots, whole_dots
@@ -81,7 +81,7 @@ PROPOSALS: tuple[Proposal, ...] = (propose_whole, propose_voted, propose_small)
 """The ways to propose dots, the fastest first."""
 
 
-def with_rims(dots: Dots, families: Sequence[Family], min_radius: float) -> Dots:
+def with_rims(dots: Dots, families: Sequence[RingPrint], min_radius: float) -> Dots:
     """Return dots, and those in the middle of what may be the rim of a band about a narrow gap.
 
     Edges of a half of an image do not show a dot whose gap is narrower than they are, but the rim
@@ -104,7 +104,7 @@ def measure_dots(gray: np.ndarray, dots: Dots | Fit, *, covariances: bool = Fals
 
 
 def measure_likely(
-    gray: np.ndarray, dots: Fit, families: Sequence[Family] | None
+    gray: np.ndarray, dots: Fit, families: Sequence[RingPrint] | None
 ) -> tuple[Fit, Fit]:
     """Return better fits of the dots whose bands are worth reading, and those of the others.
 
@@ -148,7 +148,7 @@ def _fit(gray: np.ndarray, dots: Dots | Fit, *, covariances: bool) -> Fit:
     )
 
 
-def hopes(gray: np.ndarray, dots: Fit, families: Sequence[Family]) -> np.ndarray:
+def hopes(gray: np.ndarray, dots: Fit, families: Sequence[RingPrint]) -> np.ndarray:
     """Return bounds of the mean evidence of readings for words of any family, shape (k,).
 
     Where few marks may be all that a word has, they are raised by as much.

@@ -40,7 +40,7 @@ from ahf_ros.families.ring.polar import (
     on_dark_ground,
     polar_images,
 )
-from ahf_ros.prints.ring import Family, least_marked
+from ahf_ros.prints.ring import RingPrint, least_marked
 from ahf_ros.vision import frame
 from ahf_ros.vision.black import lifted
 from ahf_ros.vision.circle_fit import ENOUGH, Fit, fit_circles
@@ -57,7 +57,7 @@ _SHIFTS = np.arange(-2.4, 2.41, 0.4)  # of edges, that are tried, px
 def read_bands(
     gray: np.ndarray,
     dots: Fit,
-    family: Family,
+    family: RingPrint,
     prior: Prior = NOTHING_KNOWN,
     least: np.ndarray | None = None,
 ) -> Hypotheses:
@@ -75,7 +75,7 @@ def read_bands(
 
 
 def _read_part(
-    gray: np.ndarray, dots: Fit, family: Family, prior: Prior, least: np.ndarray
+    gray: np.ndarray, dots: Fit, family: RingPrint, prior: Prior, least: np.ndarray
 ) -> Hypotheses:
     unread = Hypotheses.unread(dots, family)
     if not len(dots.frames):
@@ -166,7 +166,7 @@ def _settled(
     edges: Evidence,
     words: Words,
     growth: np.ndarray,
-    family: Family,
+    family: RingPrint,
     expected: frozenset[int],
     *,
     last: bool,
@@ -202,7 +202,7 @@ def _settled(
     return words.replaced(some, of_all)
 
 
-def _thin(printed: Fit, growth: np.ndarray, family: Family) -> np.ndarray:
+def _thin(printed: Fit, growth: np.ndarray, family: RingPrint) -> np.ndarray:
     """Return which bands are so thin that blur moves their edges apart, indices.
 
     The growth of the dots' colour, (k,), is in radii of the printed dots.
@@ -237,14 +237,14 @@ def _of_reading(odds: np.ndarray, words: Words, weight: np.ndarray) -> np.ndarra
     return odds / (weight * words.hidden.shape[1])
 
 
-def _overhang(growth: np.ndarray, family: Family) -> np.ndarray:
+def _overhang(growth: np.ndarray, family: RingPrint) -> np.ndarray:
     """Return by how many angles grown arcs of ink are longer at either end, shape (k,)."""
     middle = sum(family.band) / 2
     return growth / middle * (family.bits * PER_SECTOR / (2 * np.pi))
 
 
 def _joint_fit(
-    gray: np.ndarray, start: Fit, words: Words, per_sector: int, rounds: int, family: Family
+    gray: np.ndarray, start: Fit, words: Words, per_sector: int, rounds: int, family: RingPrint
 ) -> Fit:
     """Return the joint fit of dots and of the marks of their words."""
     circles = target_circles(words.words, words.starts, start.polarity, per_sector, family)

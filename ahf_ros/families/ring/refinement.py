@@ -18,7 +18,7 @@ from ahf_ros.families.ring.full_size import with_soft_edges
 from ahf_ros.families.ring.hypotheses import Hypotheses
 from ahf_ros.families.ring.known import Prior
 from ahf_ros.families.ring.reading import read_bands
-from ahf_ros.prints.ring import Family, canonical
+from ahf_ros.prints.ring import RingPrint, canonical
 from ahf_ros.vision import frame
 from ahf_ros.vision.circle_fit import ENOUGH, Fit, fit_dots
 from ahf_ros.vision.ellipse_targets import ellipse_fields, frames_of, stayed
@@ -28,7 +28,7 @@ from ahf_ros.vision.image import as_gray, check_image
 def refine_centres(
     image: np.ndarray,
     targets: Sequence[Target],
-    families: Sequence[Family],
+    families: Sequence[RingPrint],
     polarities: Sequence[int] = (1, -1),
     expected: frozenset[int] = frozenset(),
 ) -> list[Target]:
@@ -70,7 +70,7 @@ def _locate(
     gray: np.ndarray,
     start: np.ndarray,
     targets: Sequence[Target],
-    families: Sequence[Family],
+    families: Sequence[RingPrint],
     polarities: Sequence[int],
     expected: frozenset[int],
 ) -> Hypotheses:
@@ -95,7 +95,7 @@ def _agreeing(
     dots: Fit,
     decoded: np.ndarray,
     targets: Sequence[Target],
-    families: Sequence[Family],
+    families: Sequence[RingPrint],
     expected: frozenset[int],
 ) -> tuple[Hypotheses, np.ndarray]:
     """Return readings that agree with the codes of targets, and the target that each is of."""

@@ -20,7 +20,7 @@ from ahf_ros.families.ring.known import Prior
 from ahf_ros.families.ring.likelihood import SHARES, edge_evidence
 from ahf_ros.families.ring.polar import polar_images
 from ahf_ros.families.ring.reading import best_growth, read_bands
-from ahf_ros.prints.ring import FAMILY_NAMES, Family, family
+from ahf_ros.prints.ring import FAMILY_NAMES, RingPrint, family
 from ahf_ros.vision.circle_fit import Fit
 
 _FIRST = 8  # doubtful words that rivals read first
@@ -33,7 +33,7 @@ _MIXED = 0.1  # of a sector, at either end, where the next one may agree as well
 
 
 def against_rivals(
-    gray: np.ndarray, dots: Fit, found: Hypotheses, families: Sequence[Family], prior: Prior
+    gray: np.ndarray, dots: Fit, found: Hypotheses, families: Sequence[RingPrint], prior: Prior
 ) -> Hypotheses:
     """Return hypotheses of dots, none certain where a family that is not read has more evidence.
 
@@ -56,7 +56,7 @@ def against_rivals(
 
 
 def _beaten(
-    gray: np.ndarray, dots: Fit, words: Hypotheses, rivals: Sequence[Family], prior: Prior
+    gray: np.ndarray, dots: Fit, words: Hypotheses, rivals: Sequence[RingPrint], prior: Prior
 ) -> np.ndarray:
     """Return whether any of the rivals explains the bands of words better, shape (k,)."""
     beaten = np.zeros(len(words.words), bool)
@@ -106,7 +106,7 @@ def word_ceilings(
 
 
 @lru_cache(maxsize=256)  # bands that are measured make families of their own in every image
-def has_all(code: Family, other: Family) -> bool:
+def has_all(code: RingPrint, other: RingPrint) -> bool:
     """Return whether a family has all words of another one, in the same print."""
     same = (code.band, code.bits) == (other.band, other.bits)
     return same and bool(code.has(other.words).all())
