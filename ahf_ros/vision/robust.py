@@ -42,6 +42,16 @@ def medians(values: np.ndarray) -> np.ndarray:
     return np.asarray((ordered[:, (count - 1) // 2] + ordered[:, count // 2]) / 2)
 
 
+def quantiles(values: np.ndarray, share: float) -> np.ndarray:
+    """Return the quantiles of short rows, shape (k, m), none of them NaN, shape (k,).
+
+    They are those of `np.quantile`, which does far more around it.
+    """
+    ordered, place = np.sort(values, axis=1), share * (values.shape[1] - 1)
+    low, high = ordered[:, int(place)], ordered[:, min(int(place) + 1, values.shape[1] - 1)]
+    return np.asarray(low + (place - int(place)) * (high - low))
+
+
 def spread(sizes: np.ndarray, selected: np.ndarray, minimum: float) -> np.ndarray:
     """Return robust standard deviations, shape (k, 1), from the medians of absolute errors (k, m).
 

@@ -53,12 +53,13 @@ def sample_circles(
     parts that stay in the cache. Radii of shape (n,) are the same for all k frames, those of shape
     (k, n) are others for each; with m angles, the values have the shape (k, m, n).
     """
-    radii = np.broadcast_to(radii, (len(frames), np.shape(radii)[-1]))
-    values = np.empty((len(frames), len(angles), radii.shape[1]), image.dtype)
+    values = np.empty((len(frames), len(angles), radii.shape[-1]), image.dtype)
     step = max(1, _REMAP_ROWS // len(angles))
     for start in range(0, len(frames), step):
         part = slice(start, start + step)
-        across, down = circle_places(frames[part], angles, radii[part])
+        across, down = circle_places(
+            frames[part], angles, radii if radii.ndim < 2 else radii[part]
+        )
         shape = (across.shape[0] * across.shape[1], -1)
         sampled = remapped(image, across.reshape(shape), down.reshape(shape))
         values[part] = sampled.reshape(across.shape)
@@ -72,12 +73,12 @@ def circle_places(
 
     The arguments are those of `sample_circles`.
     """
-    directions = np.stack([np.cos(angles), np.sin(angles)])
+    directions = np.array([np.cos(angles), np.sin(angles)])
     along = (frames[:, :, :2] @ directions).astype(np.float32)[..., None]
     centre = frames[:, :, 2].astype(np.float32)[..., None, None]
-    radii = np.broadcast_to(radii, (len(frames), np.shape(radii)[-1])).astype(np.float32)
+    radii = radii.astype(np.float32)[..., None, :]
     affine = bool((frames[:, 2] == (0, 0, 1)).all())
-    rows = [along[:, row] * radii[:, None] for row in range(2 if affine else 3)]
+    rows = [along[:, row] * radii for row in range(2 if affine else 3)]
     for row, points in enumerate(rows):
         points += centre[:, row]
     x, y, *scale = rows

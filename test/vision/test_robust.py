@@ -5,7 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ahf_ros.vision.robust import cauchy, fit_linear, geman_mcclure, geman_mcclure_gain, median
+from ahf_ros.vision.robust import (
+    cauchy,
+    fit_linear,
+    geman_mcclure,
+    geman_mcclure_gain,
+    median,
+    quantiles,
+)
 from ahf_ros.vision.robust import spread as robust_spread
 
 
@@ -56,3 +63,10 @@ def test_values_without_weight_do_not_count() -> None:
     weights = np.array([[1.0, 1, 1, 0, 0, 0]])
     found, _ = fit_linear(values, weights, basis, scale=10.0)
     assert found[0, 0] == pytest.approx(1, abs=1e-2)
+
+
+@pytest.mark.parametrize('count', [1, 2, 32, 64])
+def test_quantiles_are_those_of_numpy(count: int) -> None:
+    values = np.random.default_rng(count).normal(size=(5, count))
+    for share in (0.0, 0.2, 0.35, 1.0):
+        assert quantiles(values, share) == pytest.approx(np.quantile(values, share, axis=1))

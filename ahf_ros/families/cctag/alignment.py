@@ -21,6 +21,7 @@ from ahf_ros.vision import frame
 from ahf_ros.vision.array_record import ArrayRecord
 from ahf_ros.vision.logistic import logistic
 from ahf_ros.vision.normal import normal_integral
+from ahf_ros.vision.robust import medians, quantiles
 
 _PART = 48  # targets at a time, which bounds the memory
 _OUTLIERS = 12.0, 6.0, 3.0, 3.0  # deviations that quarter a weight, in rounds of Gauss-Newton
@@ -191,9 +192,9 @@ def _aligned(
         (of @ ALONG).astype(np.float64) for of in (rays.errors**2, seen.values**2, seen.values)
     )
     shown -= mean**2 / ALONG.sum()
-    agreeing = (left < (1 - _AGREEING) * shown) & (
-        np.sign(rays.step) == np.sign(np.median(rays.step, axis=1))[:, None]
-    )
+    sign = np.sign(medians(rays.step))
+    agreeing = (left < (1 - _AGREEING) * shown) & (np.sign(rays.step) == sign[:, None])
+    agree = agreeing.mean(axis=1)
     rest = np.log(np.maximum(left, 1e-6) / np.maximum(shown, 1e-6))
     good = np.where(agreeing, np.exp(-rest), 1e-3)
     known = (rays.gain * ALONG).sum(axis=2).mean(axis=1) / ALONG.sum()
@@ -204,9 +205,9 @@ def _aligned(
         shift=shift,
         blur=blur,
         sharpening=sharpening,
-        colour=-np.sign(np.median(rays.step, axis=1)),
-        rays=agreeing.mean(axis=1),
-        clear=np.quantile(rest, _CLEAREST, axis=1),
+        colour=-sign,
+        rays=agree,
+        clear=quantiles(rest, _CLEAREST),
         left=rest.mean(axis=1),
         plain=_plain(
             rays.model + rays.errors / np.maximum(rays.gain, 0.05),
@@ -214,7 +215,7 @@ def _aligned(
             good[..., None] * rays.weight * rays.gain**2,
             blur / size,
         ),
-        unusual=_unusual(shift, blur, prior) * np.minimum(3 * (1 - agreeing.mean(axis=1)), 1)
+        unusual=_unusual(shift, blur, prior) * np.minimum(3 * (1 - agree), 1)
         + _hiding(shift, sharpening, known, family.narrow * size),
         known=known,
         margin=np.full(len(frames), np.nan),

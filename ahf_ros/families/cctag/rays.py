@@ -10,7 +10,7 @@ import numpy as np
 
 from ahf_ros.vision import frame
 from ahf_ros.vision.array_record import ArrayRecord
-from ahf_ros.vision.robust import NORMAL, geman_mcclure
+from ahf_ros.vision.robust import NORMAL, geman_mcclure, medians, quantiles
 
 RAYS, FEW_RAYS = 64, 32
 """Rays of a target, and those that are enough to compare its likely IDs."""
@@ -78,12 +78,12 @@ def robust_rays(seen: Seen, ink: np.ndarray, outlier: float) -> Rays:
     """
     rays = Rays.of(seen, ink)
     for _ in range(_ROUNDS):
-        usual = np.median(rays.contrast, axis=1, keepdims=True)
+        usual = medians(rays.contrast)[:, None]
         unlike = (rays.contrast - usual) / (_OTHER_CONTRAST * np.maximum(np.abs(usual), 1e-9))
         alike = geman_mcclure(1.0, unlike)
         middle = seen.values.shape[2] // 2
         of_rays = np.partition(np.abs(rays.errors), middle, axis=2)[..., middle]
-        spread = NORMAL * np.quantile(of_rays, _QUIET, axis=1)[:, None]
+        spread = NORMAL * quantiles(of_rays, _QUIET)[:, None]
         unlike = rays.errors / (outlier * np.maximum(spread, _LEAST))[..., None].astype(np.float32)
         weight = geman_mcclure((alike[..., None] * ALONG).astype(np.float32), unlike)
         rays = Rays.of(seen, ink, weight, rays.model)
@@ -136,8 +136,8 @@ class Rays:
     @staticmethod
     def _fitted(values: np.ndarray, ink: np.ndarray, weight: np.ndarray, gain: np.ndarray) -> Rays:
         powers = np.stack([np.ones_like(ink), ink, ink**2], axis=2)
-        total, of_ink, of_square = np.moveaxis(weight @ powers, 2, 0)
-        of_values, of_both = np.moveaxis((weight * values) @ powers[..., :2], 2, 0)
+        total, of_ink, of_square = (weight @ powers).transpose(2, 0, 1)
+        of_values, of_both = ((weight * values) @ powers[..., :2]).transpose(2, 0, 1)
         total = np.maximum(total, 1e-9)
         mean = of_ink / total
         step = (of_both - mean * of_values) / np.maximum(of_square - mean * of_ink, 1e-9)
@@ -157,7 +157,7 @@ class Rays:
         count, rays = self.step.shape
         of_frame, of_pairs = _around(rays)
         basis = np.concatenate([np.ones_like(ink)[:, None], ink[:, None], changes], axis=1)
-        first, second = np.triu_indices(basis.shape[1])
+        first, second = _pairs(basis.shape[1])
         weight = self.weight * self.gain
         errors = (weight * self.errors) @ changes.transpose(0, 2, 1)
         errors = (self.step[..., None] * errors).reshape(count, -1).astype(np.float64)
@@ -174,10 +174,16 @@ def _without_first(pairs: np.ndarray, size: int) -> np.ndarray:
 
     Pairs are those of the upper triangle of a matrix, row by row, before and after.
     """
-    head, first, second = pairs[..., 1:size], *np.triu_indices(size - 1)
+    head, (first, second) = pairs[..., 1:size], _pairs(size - 1)
     share = head / (pairs[..., :1] + 1e-6)
     less: np.ndarray = pairs[..., size:] - head[..., first] * share[..., second]
     return less
+
+
+@lru_cache
+def _pairs(size: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return the rows and columns of the upper triangle of a matrix, row by row."""
+    return np.triu_indices(size)
 
 
 @lru_cache
@@ -191,7 +197,7 @@ def _around(rays: int) -> tuple[np.ndarray, np.ndarray]:
     basis = frame.displacement_basis(ray_angles(rays), np.ones(rays))
     around[:, [0, 0, 1, 1, 1, 2, 2], range(7)] = -basis
     around[:, [3, 4, 5], [7, 8, 9]] = 1.0
-    first, second = np.triu_indices(6)
+    first, second = _pairs(6)
     pairs = around[:, first, :, None] * around[:, second, None]
     pairs += np.where((first != second)[:, None, None], pairs.swapaxes(2, 3), 0)
     return around.reshape(-1, 10), pairs.reshape(-1, 100)
