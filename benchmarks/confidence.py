@@ -142,14 +142,21 @@ def reliability_table(
     rows = []
     for name in (*dict.fromkeys(condition.tolist()), 'all'):
         here = (condition == name) | (name == 'all')
-        for low, high in pairwise(CLASSES):
-            within = here & (stated >= low) & ((stated < high) | (high == CLASSES[-1]))
-            if within.any():
-                shares = (f'{of[within].mean():.4f}' for of in (stated, right))
-                rows.append((name, f'{low} to {high}', within.sum(), *shares))
+        for label, (said, was) in _by_class(stated[here], right[here], CLASSES):
+            rows.append((name, label, len(said), f'{said.mean():.4f}', f'{was.mean():.4f}'))
     return report.table(
         ('condition', 'confidence', 'readings', 'mean confidence', 'share right'), rows
     )
+
+
+def _by_class(
+    stated: np.ndarray, right: np.ndarray, bounds: Sequence[float]
+) -> Iterator[tuple[str, tuple[np.ndarray, np.ndarray]]]:
+    """Yield each class of confidence with readings: its bounds, and what is stated and right."""
+    for low, high in pairwise(bounds):
+        within = (stated >= low) & ((stated < high) | (high == bounds[-1]))
+        if within.any():
+            yield f'{low} to {high}', (stated[within], right[within])
 
 
 def ring_readings(seed: int) -> Parts:
@@ -405,11 +412,8 @@ def diagram(families: Sequence[str], seeds: Sequence[int]) -> list[str]:
     rows = []
     for (family, maker), some in sorted(parts.items()):
         stated, right = np.concatenate(some, axis=1)
-        for low, high in pairwise(STATED):
-            within = (stated >= low) & ((stated < high) | (high == STATED[-1]))
-            if within.any():
-                counts = shares(stated[within], right[within])
-                rows.append((family, maker, f'{low} to {high}', *counts))
+        for label, readings in _by_class(stated, right, STATED):
+            rows.append((family, maker, label, *shares(*readings)))
     head = ('family', 'maker', 'confidence', 'readings', 'stated', 'right', 'error', 'off')
     return report.table(head, rows)
 

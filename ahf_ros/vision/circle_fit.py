@@ -253,12 +253,12 @@ def _kind(circles: Outlines, *, projective: bool, uneven: bool) -> EdgeKind:
         basis = basis[:, :5]
     window = _window(circles.points.tobytes(), circles.line.tobytes())
 
-    def smooth(edges: Edges, own: EdgeWeights) -> LightSlope:
-        common = common_slope(edges.slope, circles.polarity, own.weights)
+    def smooth(edges: Edges, own: EdgeWeights, polarity: np.ndarray) -> LightSlope:
+        common = common_slope(edges.slope, polarity, own.weights)
         prior = _LIGHT_PRIOR / edges.scale.mean(axis=1, keepdims=True)
         # Where edges were sharpened, none of their slopes is the light's.
         prior *= (1 + (common / _SHARPENED) ** 2) ** 2
-        return smooth_slopes(edges.slope - circles.polarity * common, own.weights, window, prior)
+        return smooth_slopes(edges.slope - polarity * common, own.weights, window, prior)
 
     relative_to: Literal['noise', 'light'] = 'light' if uneven else 'noise'
     return EdgeKind(basis, prior, smooth, relative_to, _MINIMUM_SPREAD, _ROUNDS)

@@ -78,7 +78,9 @@ class EdgeKind:
 
     basis: np.ndarray  # (m, n), how far unknowns move edges outwards, units of the print
     prior: np.ndarray  # (n,) or, with the growth of ink in px, (n + 1,): inverse variances
-    smooth: Callable[[Edges, EdgeWeights], LightSlope]
+    smooth: Callable[[Edges, EdgeWeights, np.ndarray], LightSlope]
+    """Returns the light across edges, from their weights and their polarity."""
+
     relative_to: Literal['noise', 'light', 'px']
     """What errors are outliers by: of noise alone, of noise and what light adds, or of px."""
 
@@ -119,7 +121,7 @@ def fit_edges(
     """
     edges = measure_outlines(gray, edge_points(frames, outlines), blur, reach)
     own = weigh_edges(edges)
-    light = kind.smooth(edges, own)
+    light = kind.smooth(edges, own, outlines.polarity)
     displacement = (edges.offset - edges.sensitivity * light.slope) / edges.scale
     of_noise = _NOISE / np.maximum(edges.bright - edges.dark, _MINIMUM_STEP) / edges.scale
     lit, in_px = kind.relative_to == 'light', kind.relative_to == 'px'

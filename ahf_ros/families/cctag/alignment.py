@@ -156,9 +156,8 @@ def _aligned(
         normal, right = rays.equations(np.stack([*by_radius, *by_edges], axis=1), ink)
         variance = (rays.weight * rays.errors**2).sum(axis=(1, 2)) / rays.weight.sum(axis=(1, 2))
         area = size**2 * (PROFILE[1] - PROFILE[0]) * 2 * np.pi / count
-        each = (
-            np.minimum(area, 1.0) / (variance + _LEAST_VARIANCE) / _OF_VARIANCE
-        )  # pixels are independent
+        # Pixels are independent.
+        each = np.minimum(area, 1.0) / (variance + _LEAST_VARIANCE) / _OF_VARIANCE
         normal, right = normal * each[:, None, None], right * each[:, None]
         normal[:, range(5), range(5)] += 1e-6
         usual = usual_perspective(frames)

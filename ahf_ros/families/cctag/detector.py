@@ -323,8 +323,7 @@ def _best(rings: Aligned, prior: Prior) -> Aligned:
 
 def _near(frames: np.ndarray, others: np.ndarray) -> np.ndarray:
     """Return whether targets (k, 3, 3) are at the places of others (n, 3, 3), shape (k, n)."""
-    away = np.hypot(*(frames[:, None, :2, 2] - others[None, :, :2, 2]).transpose(2, 0, 1))
-    return away < _SAME_PLACE * frame.mean_radii(others)
+    return _away(frames, others) < _SAME_PLACE * frame.mean_radii(others)
 
 
 def _alone(frames: np.ndarray, others: np.ndarray) -> np.ndarray:
@@ -334,9 +333,13 @@ def _alone(frames: np.ndarray, others: np.ndarray) -> np.ndarray:
 
 def _free(frames: np.ndarray, others: np.ndarray) -> np.ndarray:
     """Return whether targets, (k, 3, 3), overlap no other, (n, 3, 3), shape (k,)."""
-    away = np.hypot(*(frames[:, None, :2, 2] - others[None, :, :2, 2]).transpose(2, 0, 1))
     reach = _OVERLAPPING * (frame.mean_radii(frames)[:, None] + frame.mean_radii(others))
-    return np.logical_not((away < reach).any(axis=1))
+    return np.logical_not((_away(frames, others) < reach).any(axis=1))
+
+
+def _away(frames: np.ndarray, others: np.ndarray) -> np.ndarray:
+    """Return the distances of targets (k, 3, 3) from others (n, 3, 3), px, shape (k, n)."""
+    return np.hypot(*(frames[:, None, :2, 2] - others[None, :, :2, 2]).transpose(2, 0, 1))
 
 
 def _together(rings: Aligned) -> Aligned:

@@ -38,9 +38,7 @@ _PROBABLE = 0.75  # probability of a target, from which it is placed
 _POSSIBLE, _MOST = 0.05, 128  # the same, from which it is read again, and number of these
 _RIVALS = 12  # IDs that rays may show
 _ODDS, _LESS = 6.0, 2.0  # ln of the odds of a target that is usual, less by each deviation
-_BEYOND_DOUBT = (
-    200.0  # cost more than that of the likeliest ID, of one that is not fitted to the end
-)
+_BEYOND_DOUBT = 200.0  # cost more than the likeliest ID's, of one that is not fitted to the end
 _OF_MARGIN = 0.1  # share of ln of the odds of IDs, by pixels, that is believed
 
 

@@ -110,24 +110,19 @@ def _polarity(prints: np.ndarray) -> np.ndarray:
     return each.reshape(len(prints), -1)
 
 
-def _kind(grid: Outlines, cells: int) -> EdgeKind:
+@lru_cache
+def _kind(cells: int) -> EdgeKind:
     """Return what moves the edges of markers: a frame, and the growth of ink."""
-    window = _window(cells * len(_ALONG))
+    grid, index = _grid(cells), np.arange(cells * len(_ALONG))
+    window = np.exp(-0.5 * ((index[:, None] - index) / _LIGHT_REACH) ** 2)
 
-    def smooth(edges: Edges, own: EdgeWeights) -> LightSlope:
-        common = common_slope(edges.slope, grid.polarity, own.weights)
-        slopes = edges.slope - grid.polarity * common
+    def smooth(edges: Edges, own: EdgeWeights, polarity: np.ndarray) -> LightSlope:
+        slopes = edges.slope - polarity * common_slope(edges.slope, polarity, own.weights)
         return smooth_slopes(slopes, own.weights, window, _LIGHT_PRIOR, rounds=1)
 
     basis = outline_basis(grid.points, grid.normals)
     prior = np.full(basis.shape[1] + 1, WEAK_PRIOR)
     return EdgeKind(basis, prior, smooth, 'px', _MINIMUM_ERROR, _ROUNDS)
-
-
-@lru_cache
-def _window(count: int) -> np.ndarray:
-    index = np.arange(count)
-    return np.exp(-0.5 * ((index[:, None] - index) / _LIGHT_REACH) ** 2)
 
 
 def _fitted(
@@ -142,7 +137,7 @@ def _fitted(
         left_out = (grid.group == 0) & (inside_first and number < _INSIDE)
         outlines = replace(grid, polarity=np.where(left_out, 0, expected))
         used = np.clip(_WIDE_BLUR * cell, blur, BLURS[1]) if number < _WIDE else blur
-        fit = fit_edges(gray, frames, outlines, _kind(outlines, cells), used, _REACH / cells)
+        fit = fit_edges(gray, frames, outlines, _kind(cells), used, _REACH / cells)
         edges, own = fit.edges, fit.own
         if number:
             blur = np.clip(used + median(edges.softness, edges.visible, 0.0), *BLURS)
