@@ -5,8 +5,6 @@
 A row is a family under one light. Each image is the first one that `auto` sees.
 """
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Sequence
 from itertools import product

@@ -8,8 +8,6 @@ names. Each process reads its files whole, so the operating system has them in m
 first time; on a cold disk, add the time for the bytes that the tables tell.
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 import resource

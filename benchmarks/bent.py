@@ -13,8 +13,6 @@ Seeds from 101 on are for tests.
         [--polarities dark bright] [--lights 'stripe 0.12' ...] [--seeds 401 402] [--output FILE]
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 from collections.abc import Sequence

@@ -8,8 +8,6 @@ imported into other modules change as well. A line of JSON comes for each pictur
 identified, so that those that were done count where a change takes too long.
 """
 
-from __future__ import annotations
-
 import argparse
 import ast
 import json

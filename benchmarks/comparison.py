@@ -5,8 +5,6 @@ both were measured on the same machine, one after the other. The time in multipl
 search for contours depends less on the machine.
 """
 
-from __future__ import annotations
-
 from statistics import median
 
 from benchmarks.report import Report, number, table

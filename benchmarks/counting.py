@@ -6,8 +6,6 @@ on are for tests, those below for development.
     python -m benchmarks.counting [--seeds 101]
 """
 
-from __future__ import annotations
-
 import sys
 import time
 from collections.abc import Sequence

@@ -8,8 +8,6 @@ as those of all, and the photographs of the panel as well; the third reads marks
 targets. Seeds from 101 on are for tests: nothing in the package was chosen by looking at them.
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 import sys

@@ -9,8 +9,6 @@ package was chosen by looking at them.
     python -m benchmarks.dots [--parts scenes ...] [--seeds 101] [--json FILE]
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace

@@ -14,8 +14,6 @@ The pictures are those of a folder with a `truth.csv`, photographs with truth, a
 Each gate has a process of its own, and takes a minute for twenty pictures.
 """
 
-from __future__ import annotations
-
 import argparse
 import ast
 import csv

@@ -11,8 +11,6 @@ is of one kind or the other. The panel is a set of photographs and is shown wher
 A command is used as the detector `command` does; its time includes its start.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import sys

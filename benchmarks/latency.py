@@ -15,8 +15,6 @@ measured in turn, image by image, so that their ratio holds on a machine with ot
     python -m benchmarks.latency [--images 40] [--before FOLDER] [--output docs/figures/latency]
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import os

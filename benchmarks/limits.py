@@ -15,8 +15,6 @@ on white cards before a darker wall. Seeds from 101 on are for tests.
         [--output FILE]
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 from collections.abc import Sequence

@@ -12,8 +12,6 @@ Seeds from 101 on are for tests.
 FOLDER has clones of the repositories of the photographs, see `benchmarks.photographs`.
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 from collections.abc import Iterator, Sequence

@@ -6,8 +6,6 @@
 that of photographs.
 """
 
-from __future__ import annotations
-
 import resource
 import time
 from collections.abc import Callable, Sequence

@@ -26,8 +26,6 @@ target moves and in which directions, and `compare` knows neither. *Largest shar
 single targets, which does not, with the bound that gives exactly 5 % false alarms.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 

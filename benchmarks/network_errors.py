@@ -10,8 +10,6 @@ and so on: `ellipsoids` and `lenses` ask how often error ellipsoids hold the tru
 similarity and their whole covariance C: 1 if standard deviations are right.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any

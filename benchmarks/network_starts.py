@@ -5,8 +5,6 @@ where `orient` raises or warns, and as silently wrong where it does neither and 
 the truth. Random photographs show three targets or fewer now and then, which have several poses.
 """
 
-from __future__ import annotations
-
 import csv
 import os
 import time

@@ -10,8 +10,6 @@ preprocessors stand beside AHF. The paper's own figures are those of its photogr
 come from an earlier --json.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import multiprocessing

@@ -12,8 +12,6 @@ from a clone of its repository, and identified by itself, with its family named 
         [--families named auto] [--output FILE]
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 from collections.abc import Sequence

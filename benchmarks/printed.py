@@ -4,8 +4,6 @@
 .venv/bin/python -m benchmarks.printed --families metashape12 gsi --sample 50
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 from collections.abc import Sequence

@@ -6,8 +6,6 @@ family. Seeds from 301 on are for tests, those below 100 for development.
     python -m benchmarks.random_families [--seeds 301 302]
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 from collections.abc import Sequence

@@ -8,8 +8,6 @@ from their covariances; those of `clouds` are measured in simulated clouds, as ~
 so that their covariances are estimated, too.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """Reports of benchmarks: options that all of them have, tables, and files."""
 
-from __future__ import annotations
-
 import argparse
 import json
 import os

@@ -1,7 +1,5 @@
 """Rows of benchmarks: a kind of scene, rendered with seeds, identified and scored."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace

@@ -7,8 +7,6 @@ where the target is not identified. No limits of size are set. Seeds from 101 on
         [--seed 101] [--output FILE]
 """
 
-from __future__ import annotations
-
 import argparse
 import math
 import sys

@@ -12,8 +12,6 @@ precision, one chromosome after the other, a generation of 50 before it looks wh
     python -m benchmarks.speed [--light stripe] [--ambient 0.3] [--seed 101]
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 import statistics

@@ -11,8 +11,6 @@ pupil-apriltags is left out where it is not installed. Seeds from 101 on are for
         [--grid COLUMNSxROWS] [--output FILE]
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 import time

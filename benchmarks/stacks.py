@@ -7,8 +7,6 @@ first image alone, the stack, and the same scene in normal light. Seeds from 101
         [--output FILE]
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 import time

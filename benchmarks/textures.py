@@ -6,8 +6,6 @@ Textures from a seed on and the images that scikit-image ships are identified as
 does. Every report is false.
 """
 
-from __future__ import annotations
-
 import sys
 import time
 from collections.abc import Iterator, Sequence

@@ -1,7 +1,5 @@
 """What tests and benchmarks share: places, real nodes and made-up bags."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Bags for the tests, written by rosbags."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -6,8 +6,6 @@ identifies a small image with each detector, and prints the calls beside the rec
 `--update` records them. `test/test_calls.py` holds the package to the record.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import sys

@@ -5,8 +5,6 @@ deviations, in the model of Brown backward, with affinity and without shear. The
 DBAT's stations, rounded, and a focal length of 1.2 image widths.
 """
 
-from __future__ import annotations
-
 import os
 import re
 from pathlib import Path

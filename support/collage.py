@@ -1,7 +1,5 @@
 """Scenes of one target each, side by side in one image: targets of very different sizes."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import ceil

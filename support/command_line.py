@@ -1,7 +1,5 @@
 """The command `ahf`, in this process or in one of its own, and other programs of Python."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from functools import partial

@@ -1,7 +1,5 @@
 """The node `detector` as a process of its own, with its parameters and services."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import cached_property

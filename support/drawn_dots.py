@@ -1,7 +1,5 @@
 """Dots drawn on paper, and light on them."""
 
-from __future__ import annotations
-
 import cv2
 import numpy as np
 

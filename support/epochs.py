@@ -1,7 +1,5 @@
 """Epochs of a small network: adjusted bundles with noise, and targets that moved."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 

@@ -4,8 +4,6 @@ Each returns the places of the targets, px, (0, 0) being the centre of the first
 of the image and the label; each states where its format has (0, 0).
 """
 
-from __future__ import annotations
-
 import csv
 import json
 import sqlite3

@@ -1,7 +1,5 @@
 """A process that fails, or is killed, at one step of writing files."""
 
-from __future__ import annotations
-
 import errno
 import os
 import signal

@@ -7,8 +7,6 @@ References
 .. [1] Shang & Liu, Remote Sens. 2023, 15, 3151.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from ahf_ros.identification.filtering.homomorphic import Transfer, transfer

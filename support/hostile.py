@@ -4,8 +4,6 @@ Tests draw from it with hypothesis: always the same few examples, or many other 
 `--hypothesis-profile attack`.
 """
 
-from __future__ import annotations
-
 import re
 from typing import Any
 

@@ -1,7 +1,5 @@
 """A job for the tests of engines: it squares numbers, reports, fails or kills its process."""
 
-from __future__ import annotations
-
 import os
 import signal
 from pathlib import Path

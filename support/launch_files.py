@@ -4,8 +4,6 @@ A stand-in for launch lists the processes that a launch file describes, with the
 does not know whether launch accepts the file: a test asks launch itself where it is installed.
 """
 
-from __future__ import annotations
-
 import re
 import runpy
 import sys

@@ -1,7 +1,5 @@
 """Real node processes, and a node of one's own to talk to them with: for benchmarks and tests."""
 
-from __future__ import annotations
-
 import fcntl
 import os
 import signal

@@ -1,7 +1,5 @@
 """MCAP files record by record, also such as no ROS tool would write."""
 
-from __future__ import annotations
-
 import struct
 from dataclasses import dataclass, field
 from pathlib import Path

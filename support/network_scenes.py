@@ -1,7 +1,5 @@
 """Networks without images: exact projections of targets in many photographs, with noise."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

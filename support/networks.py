@@ -1,7 +1,5 @@
 """A small network whose coordinates, poses and observations are known without any error."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

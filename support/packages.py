@@ -1,7 +1,5 @@
 """Other packages that add a detector, made on the spot."""
 
-from __future__ import annotations
-
 import runpy
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Photographs with truth: tests of them skip where they are missing, unless they were promised."""
 
-from __future__ import annotations
-
 import os
 
 import pytest

@@ -1,7 +1,5 @@
 """Single images of targets whose poses are known."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

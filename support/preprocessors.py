@@ -1,7 +1,5 @@
 """What others do about uneven light before an identification: rivals of AHF in benchmarks."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import cv2

@@ -1,7 +1,5 @@
 """Printed sheets, rendered as a camera shows them, and what is identified on them."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Iterator
 from itertools import islice

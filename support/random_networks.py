@@ -1,7 +1,5 @@
 """Random networks without images: photographs of targets, with noise and perhaps wrong IDs."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

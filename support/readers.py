@@ -3,8 +3,6 @@
 A reader that is missing here fails a test, see `ahf_ros.base.opening.reader`.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass

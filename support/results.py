@@ -1,7 +1,5 @@
 """Results of small images, as `ahf identify --json` prints them."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Dots of ring targets for tests of single steps of their detector."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

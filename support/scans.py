@@ -1,7 +1,5 @@
 """Simulated scans around an object: a ring of stations whose neighbours share targets."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Scenes that tests share, each rendered once, and what is identified in them."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from functools import cache, lru_cache
 from typing import Any

@@ -4,8 +4,6 @@ Each epoch is a bundle of its own photographs: image points with normal errors, 
 and radial distortion unknown, inner constraints, and a scale bar where the scale is fixed.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

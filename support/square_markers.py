@@ -1,7 +1,5 @@
 """Square markers, which the oldest OpenCV does not have."""
 
-from __future__ import annotations
-
 import cv2
 import pytest
 

@@ -1,7 +1,5 @@
 """Square markers read by this package, by OpenCV and by AprilTag's own detector."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Photographs by strangers: what they show, and where they are in clones of repositories."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 from pathlib import Path

@@ -1,7 +1,5 @@
 """An independent reader of the SVG files of sheets: what is black, as an image."""
 
-from __future__ import annotations
-
 import math
 import re
 import xml.etree.ElementTree as ElementTree

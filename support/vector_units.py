@@ -7,8 +7,6 @@ differently: what is computed on one processor differs in the last bits from wha
 another. A test that passes natively and fails here depends on those bits.
 """
 
-from __future__ import annotations
-
 import ast
 import ctypes
 import os

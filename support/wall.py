@@ -1,7 +1,5 @@
 """A wall with targets, as a scanner sees it: images and organised clouds."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

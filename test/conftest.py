@@ -1,7 +1,5 @@
 """What all tests share: a header, the drawn examples, and the graph of real nodes."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path

@@ -1,7 +1,5 @@
 """No detector calls more functions than is recorded: what takes longer does not come unseen."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The documentation: its tables are current, its examples work, its links lead somewhere."""
 
-from __future__ import annotations
-
 import doctest
 import re
 import runpy

@@ -1,7 +1,5 @@
 """Every detector and every kind of family gives the same answer by every way in."""
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess

@@ -1,7 +1,5 @@
 """docs/licences.md, which scripts/licences.py prints."""
 
-from __future__ import annotations
-
 import configparser
 import re
 

@@ -1,7 +1,5 @@
 """Built from the sources: by rosdep and bloom, for Debian, for conda, in a container."""
 
-from __future__ import annotations
-
 import os
 import re
 import runpy

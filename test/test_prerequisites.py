@@ -1,7 +1,5 @@
 """What is said at once where something is missing to install the package or to run its nodes."""
 
-from __future__ import annotations
-
 import importlib.util
 import os
 import platform

@@ -1,7 +1,5 @@
 """What users import from `ahf_ros`."""
 
-from __future__ import annotations
-
 import ast
 import doctest
 import inspect

@@ -3,8 +3,6 @@
 `--hypothesis-profile attack` tries many more. Bags have a test of their own, test_bag_hostile.py.
 """
 
-from __future__ import annotations
-
 import ast
 import importlib
 import pkgutil

@@ -1,7 +1,5 @@
 """The core without what only POSIX has, as on Windows: nothing of it is imported or used."""
 
-from __future__ import annotations
-
 import json
 import sys
 from pathlib import Path, PureWindowsPath

@@ -1,7 +1,5 @@
 """Sheets that are bent, photographed by the second maker of pictures."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

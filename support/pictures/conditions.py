@@ -5,8 +5,6 @@
 `pictures` are the same for all families, by three makers, where readings begin to fail.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial

@@ -1,7 +1,5 @@
 """Scenes of targets that are disturbed in all the ways that a table has rows for."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace

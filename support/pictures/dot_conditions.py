@@ -1,7 +1,5 @@
 """Scenes under every condition that the confidences of `gsi` and of `dots` have to bear."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import replace
 from itertools import product

@@ -1,7 +1,5 @@
 """Families of rings drawn at random, and sheets of their targets."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

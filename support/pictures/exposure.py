@@ -1,7 +1,5 @@
 """How sheets of targets are photographed: what lies before them, reflections, light and noise."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass

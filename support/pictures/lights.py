@@ -3,8 +3,6 @@
 They are listed by name: a light that is added to the package changes no figure.
 """
 
-from __future__ import annotations
-
 PATTERNS = (
     'stripe',
     'wide_stripe',

@@ -1,7 +1,5 @@
 """Marks that look like ring targets and are none, and clutter."""
 
-from __future__ import annotations
-
 import math
 import string
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """Objects before targets, and reflections on them."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from functools import partial

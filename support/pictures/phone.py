@@ -1,7 +1,5 @@
 """What a phone makes of an image: blur, contrast, noise, denoising, sharpening, JPEG."""
 
-from __future__ import annotations
-
 import cv2
 import numpy as np
 

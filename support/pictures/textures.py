@@ -1,7 +1,5 @@
 """Textured images without targets: grain, bricks, foliage, pebbles, text, grids of dots, rings."""
 
-from __future__ import annotations
-
 import string
 
 import cv2

@@ -1,7 +1,5 @@
 """`ahf bag` on real bags: what is in them, what is missing, what was broken off."""
 
-from __future__ import annotations
-
 import signal
 import subprocess
 import sys

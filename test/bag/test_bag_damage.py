@@ -1,7 +1,5 @@
 """`ahf bag` on bags that are damaged or hostile: nothing is lost without being named."""
 
-from __future__ import annotations
-
 import json
 import os
 import sqlite3

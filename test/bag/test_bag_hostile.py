@@ -1,7 +1,5 @@
 """`ahf bag` on damaged bytes, and on records, rows and metadata of any content."""
 
-from __future__ import annotations
-
 import shutil
 import sqlite3
 from collections import Counter

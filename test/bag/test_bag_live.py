@@ -1,7 +1,5 @@
 """The node and `ahf bag` give the same answers to the same images."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """`ahf bag --register`: the scans of a bag in one frame."""
 
-from __future__ import annotations
-
 import json
 from functools import cache
 from pathlib import Path

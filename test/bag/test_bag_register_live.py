@@ -1,7 +1,5 @@
 """The nodes, `ahf bag --register` and `ahf register` write the same files from the same scans."""
 
-from __future__ import annotations
-
 import time
 from copy import deepcopy
 from pathlib import Path

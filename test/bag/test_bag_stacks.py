@@ -1,7 +1,5 @@
 """Stacks of images in bags."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

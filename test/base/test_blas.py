@@ -1,7 +1,5 @@
 """BLAS has one thread while targets are identified, and as many as before at other times."""
 
-from __future__ import annotations
-
 import threading
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Former places of modules: each leads to a module, with the same objects, and says so."""
 
-from __future__ import annotations
-
 import sys
 import warnings
 from importlib import import_module

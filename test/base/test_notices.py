@@ -1,7 +1,5 @@
 """What is said of an image is said once."""
 
-from __future__ import annotations
-
 from unittest.mock import Mock
 
 import pytest

@@ -1,7 +1,5 @@
 """The one way in: what no reader gets, and what becomes of what a parser raises."""
 
-from __future__ import annotations
-
 import os
 import socket
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The types of keyword arguments follow the settings."""
 
-from __future__ import annotations
-
 import runpy
 
 from support import ROOT

@@ -1,7 +1,5 @@
 """YAML in bounds: plain values with their lines, and nothing that grows or runs."""
 
-from __future__ import annotations
-
 import math
 
 import pytest

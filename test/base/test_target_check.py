@@ -1,7 +1,5 @@
 """The gate for results of detectors: what passes fits into messages; the rest is named."""
 
-from __future__ import annotations
-
 import json
 import math
 import struct

@@ -1,7 +1,5 @@
 """Files and sets of files that are old or new, and nothing between, wherever writing fails."""
 
-from __future__ import annotations
-
 import ast
 import json
 import os

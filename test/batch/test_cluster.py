@@ -1,7 +1,5 @@
 """A real scheduler and real workers on this machine, which die."""
 
-from __future__ import annotations
-
 import json
 import logging
 import os

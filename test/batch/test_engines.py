@@ -1,7 +1,5 @@
 """Engines of one machine: order, processes that die, errors, bounds."""
 
-from __future__ import annotations
-
 import os
 from contextlib import closing
 from importlib import import_module

@@ -1,7 +1,5 @@
 """The identification of the images of a task."""
 
-from __future__ import annotations
-
 import itertools
 import signal
 from dataclasses import replace

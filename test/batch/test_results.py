@@ -1,7 +1,5 @@
 """Results that are kept: a later run goes on, and does again what is out of date."""
 
-from __future__ import annotations
-
 import json
 import os
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """Images that arrive in a folder."""
 
-from __future__ import annotations
-
 import json
 import os
 import signal

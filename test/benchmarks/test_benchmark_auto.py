@@ -1,7 +1,5 @@
 """The comparison of `auto` with families that are named."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

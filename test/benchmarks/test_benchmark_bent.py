@@ -1,7 +1,5 @@
 """The benchmark of bent sheets: every row is a picture, and files hold what is printed."""
 
-from __future__ import annotations
-
 import json
 from itertools import product
 from pathlib import Path

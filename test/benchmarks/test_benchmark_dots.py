@@ -1,7 +1,5 @@
 """The benchmark of rings of dots prints wrong IDs and false positives, and draws what it says."""
 
-from __future__ import annotations
-
 from benchmarks import dots
 
 

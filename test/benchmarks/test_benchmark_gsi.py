@@ -1,7 +1,5 @@
 """The benchmark of point-distributed targets prints both detectors beside each other."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import cv2

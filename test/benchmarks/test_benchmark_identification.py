@@ -1,7 +1,5 @@
 """The benchmark of identification: its figures, its hook for other programs, its seeds."""
 
-from __future__ import annotations
-
 import json
 import sys
 from pathlib import Path

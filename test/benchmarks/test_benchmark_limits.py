@@ -1,7 +1,5 @@
 """The benchmark of the limits of light: every row is a scene, and files hold what is printed."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

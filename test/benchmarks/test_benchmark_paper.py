@@ -1,7 +1,5 @@
 """The experiment of the paper as one command, on images that are small and few."""
 
-from __future__ import annotations
-
 import io
 import json
 from contextlib import redirect_stdout

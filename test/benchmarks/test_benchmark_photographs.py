@@ -1,7 +1,5 @@
 """The benchmark of photographs: its truth is complete, and pictures come from clones."""
 
-from __future__ import annotations
-
 import subprocess
 from pathlib import Path
 from typing import Any

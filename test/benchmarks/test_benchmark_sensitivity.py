@@ -1,7 +1,5 @@
 """A number is changed wherever it is used, and what that changes is seen."""
 
-from __future__ import annotations
-
 import math
 import sys
 from pathlib import Path

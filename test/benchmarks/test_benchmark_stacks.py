@@ -1,7 +1,5 @@
 """The benchmark of stacks on a small scene."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Every benchmark starts, and every one that is named exists."""
 
-from __future__ import annotations
-
 import re
 
 from support import ROOT

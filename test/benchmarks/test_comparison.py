@@ -1,7 +1,5 @@
 """Figures of before and after side by side."""
 
-from __future__ import annotations
-
 import json
 from copy import deepcopy
 from typing import Any

@@ -1,7 +1,5 @@
 """The benchmark of disturbances: its sheets, what covers them, and its tables."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A gate is found where it is, opened, and judged by what it loses and saves."""
 
-from __future__ import annotations
-
 import ast
 from pathlib import Path
 

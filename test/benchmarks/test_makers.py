@@ -1,7 +1,5 @@
 """The counts of readings by kind, maker and class of confidence."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

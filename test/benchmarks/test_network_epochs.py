@@ -1,7 +1,5 @@
 """The benchmark of the congruence test, with few runs."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from benchmarks.network_epochs import figures

@@ -1,7 +1,5 @@
 """The bound of what any congruence test can locate, with few pairs of epochs."""
 
-from __future__ import annotations
-
 import pytest
 
 from benchmarks.network_epochs import PART, located

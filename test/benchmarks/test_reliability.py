@@ -1,7 +1,5 @@
 """The table of stated confidences and the share that is right."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from benchmarks.confidence import reliability_table

@@ -1,7 +1,5 @@
 """The command line as its users call it: processes, files, exit statuses."""
 
-from __future__ import annotations
-
 import json
 import re
 import struct

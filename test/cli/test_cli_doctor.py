@@ -1,7 +1,5 @@
 """`ahf doctor`: what is there, and what is missing for what."""
 
-from __future__ import annotations
-
 import re
 from importlib import metadata
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The command line under signals, closed and full outputs: it ends in order, and soon."""
 
-from __future__ import annotations
-
 import json
 import os
 import signal

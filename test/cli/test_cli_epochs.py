@@ -1,7 +1,5 @@
 """`ahf measure` and `ahf compare`, on networks that were adjusted and written."""
 
-from __future__ import annotations
-
 import csv
 import json
 import shutil

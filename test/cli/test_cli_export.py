@@ -1,7 +1,5 @@
 """`ahf export` and `ahf identify --export`: one way from results to files."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Commands without the packages of extras: who needs one names it, and the others do without."""
 
-from __future__ import annotations
-
 import json
 import re
 import runpy

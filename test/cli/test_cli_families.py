@@ -1,7 +1,5 @@
 """Families whose data files are found by their names."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

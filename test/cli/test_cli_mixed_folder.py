@@ -1,7 +1,5 @@
 """Folders as people have them: broken files, other families, one photograph twice, mirrors."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """`ahf orient`: from results to a folder with coordinates."""
 
-from __future__ import annotations
-
 import csv
 import json
 import os

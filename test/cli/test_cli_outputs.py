@@ -1,7 +1,5 @@
 """No output takes the place of an input: each pair of options of all commands that name such."""
 
-from __future__ import annotations
-
 import argparse
 import shutil
 from collections.abc import Iterator

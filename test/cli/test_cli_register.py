@@ -1,7 +1,5 @@
 """`ahf register` on scans of a wall that differ by how the scanner stands."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

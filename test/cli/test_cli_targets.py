@@ -1,7 +1,5 @@
 """`ahf targets`: printed PDF files, rendered and identified, and what happens where they fail."""
 
-from __future__ import annotations
-
 import json
 import sys
 from functools import partial

@@ -1,7 +1,5 @@
 """The demo as a user starts it, and the picture that it makes."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Programs of docs/examples on photographs, a recording and a network."""
 
-from __future__ import annotations
-
 import csv
 import math
 import re

@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 from ahf_ros.clouds.cloud_settings import CloudSettings
 from ahf_ros.clouds.matching import Matcher
 

@@ -1,7 +1,5 @@
 """Targets look like the print of their words; other prints do not, nearly all round."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import cv2

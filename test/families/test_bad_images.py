@@ -3,8 +3,6 @@
 None shows a target of the detector, or one many times, so that nothing false may be reported.
 """
 
-from __future__ import annotations
-
 import warnings
 from functools import cache
 from typing import Any

@@ -1,7 +1,5 @@
 """The ends of arcs: at the borders of sectors for words, anywhere for other arcs."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Targets of one family and ID, dark ones and bright ones."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

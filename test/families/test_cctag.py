@@ -1,7 +1,5 @@
 """CCTags are identified, and nothing else is."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 

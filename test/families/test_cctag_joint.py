@@ -1,7 +1,5 @@
 """The rings of CCTags and the light on them are fitted to pixels together."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import cv2

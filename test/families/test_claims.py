@@ -1,7 +1,5 @@
 """Of several targets with one place or one ID the most certain one is left."""
 
-from __future__ import annotations
-
 from ahf_ros.base.target import UNDECODED, Target
 from ahf_ros.families.claims import best_targets
 

@@ -1,7 +1,5 @@
 """Which words compete for a band, and by how much they differ."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

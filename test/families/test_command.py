@@ -1,7 +1,5 @@
 """A detector that is another program."""
 
-from __future__ import annotations
-
 import resource
 import signal
 import sys

@@ -1,7 +1,5 @@
 """The probability of a reading, and the data file of its weights, which tells what made it."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Contradicting readings: resolved where one is clearly better, undecoded where none is."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Counts of targets from images, whether their words can be read or not."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

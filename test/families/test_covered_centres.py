@@ -1,7 +1,5 @@
 """Covariances of centres that edges of light have moved: they say so."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

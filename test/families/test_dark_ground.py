@@ -1,7 +1,5 @@
 """Bright ring targets on dark squares and discs that end where the band does, on white paper."""
 
-from __future__ import annotations
-
 import cv2
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """One dynamic program over word and cover, on evidence that is written down."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Ring targets whose data files tell more of their print."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

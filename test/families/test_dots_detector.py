@@ -1,7 +1,5 @@
 """Rings of dots are identified, and nothing else is."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Rings of dots as published: the threshold, and what is no code."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """What the detectors of targets of dots have in common: gsi and dots, and those as published."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

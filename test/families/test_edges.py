@@ -1,7 +1,5 @@
 """Square markers placed by the edges of their print."""
 
-from __future__ import annotations
-
 import cv2
 import numpy as np
 import pytest

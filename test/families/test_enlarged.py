@@ -1,7 +1,5 @@
 """Evidence in the same picture at other sizes: interpolation adds nothing."""
 
-from __future__ import annotations
-
 import cv2
 import numpy as np
 import pytest

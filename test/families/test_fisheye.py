@@ -1,7 +1,5 @@
 """Ring targets through an equidistant fisheye lens, which bends the circles of a target."""
 
-from __future__ import annotations
-
 import cv2
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """What is documented as float32 is that, under NumPy 2 and 1 alike: half the memory to move."""
 
-from __future__ import annotations
-
 from dataclasses import fields
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Frames of square markers."""
 
-from __future__ import annotations
-
 import cv2
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """Targets of any size and blur: none is passed over, and centres are those of sharp edges."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A glance finds outermost circles from any circle of a CCTag, and none about a disc."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Point-distributed targets are identified, and nothing else is."""
 
-from __future__ import annotations
-
 from itertools import product
 from pathlib import Path
 

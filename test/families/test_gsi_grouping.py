@@ -1,7 +1,5 @@
 """Templates among dots, and which dot is nearest."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ahf_ros.families.gsi.grouping import find_templates, nearest_dots

@@ -1,7 +1,5 @@
 """A family learnt from measured coordinates."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

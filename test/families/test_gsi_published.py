@@ -1,7 +1,5 @@
 """The published method for GSI's targets: how it decodes points."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

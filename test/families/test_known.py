@@ -1,7 +1,5 @@
 """What is known of an image while its targets are read: dots, growth, and IDs that are there."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import replace
 from typing import Any

@@ -1,7 +1,5 @@
 """Light inside a target, predicted from the light around its marks."""
 
-from __future__ import annotations
-
 import cv2
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """What steps and levels say of paper and ink, on polar images that are written down."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

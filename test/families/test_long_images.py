@@ -1,7 +1,5 @@
 """Strips of 40,000 px, as of line cameras, are identified from end to end."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Large images fit into little memory: what is measured a pixel of a smaller one."""
 
-from __future__ import annotations
-
 import tracemalloc
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Each promise of `Target` and of the settings, on the same scenes for every kind of family."""
 
-from __future__ import annotations
-
 from functools import cache
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Photographs of real targets, those of the panel identified by the command as users call it."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

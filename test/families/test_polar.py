@@ -1,7 +1,5 @@
 """Polar images of targets: gray values, how far they reach, and the usual levels of the ground."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import cv2

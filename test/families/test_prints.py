@@ -1,7 +1,5 @@
 """Prints of square markers laid over an image: small ones, too, and only where light is even."""
 
-from __future__ import annotations
-
 import cv2
 import numpy as np
 

@@ -1,7 +1,5 @@
 """Prints whose bands are small beside their dots, as where dots have grown more."""
 
-from __future__ import annotations
-
 import cv2
 import numpy as np
 

@@ -1,7 +1,5 @@
 """Which dots are worth reading."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Reading bands in the frames of their dots: words, covers, growth and what is no target."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Places taken from the image as received, for targets that were found elsewhere."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

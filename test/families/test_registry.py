@@ -1,7 +1,5 @@
 """The registry of detectors and the settings that they share."""
 
-from __future__ import annotations
-
 import gc
 import runpy
 import time

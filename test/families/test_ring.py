@@ -1,7 +1,5 @@
 """The ring detector: what it reads under which light, what it refuses, and that it is exact."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache, partial
 from typing import Any

@@ -1,7 +1,5 @@
 """Where ring targets have edges."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """What both detectors of ring codes promise."""
 
-from __future__ import annotations
-
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from typing import Any

@@ -1,7 +1,5 @@
 """Families of rings learnt from photographs."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Several families of ring targets in one image."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache

@@ -1,7 +1,5 @@
 """Families of several kinds in one image, named or settled on the first images."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from functools import cache

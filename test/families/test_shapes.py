@@ -1,7 +1,5 @@
 """What tells squares seen by a camera from letters and the like."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Identification of square markers on rendered scenes."""
 
-from __future__ import annotations
-
 import cv2
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """The traditional detector: what it reads, what it refuses, and that it needs the filter."""
 
-from __future__ import annotations
-
 from dataclasses import asdict
 
 import cv2

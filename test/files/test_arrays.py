@@ -1,7 +1,5 @@
 """Archives of arrays that are not what they are said to be."""
 
-from __future__ import annotations
-
 import io
 import zipfile
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """Images of HEIC, as far as the extra for them is installed."""
 
-from __future__ import annotations
-
 import io
 import json
 from pathlib import Path

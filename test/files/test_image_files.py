@@ -1,7 +1,5 @@
 """Images in files, turned or not; every file that cannot be used is named."""
 
-from __future__ import annotations
-
 import struct
 import sys
 import zlib

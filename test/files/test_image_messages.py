@@ -1,7 +1,5 @@
 """Image messages of every encoding, as ROS and rosbags have them."""
 
-from __future__ import annotations
-
 import struct
 import sys
 import zlib

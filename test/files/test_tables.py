@@ -1,7 +1,5 @@
 """Tables of other programs: names of columns, separators, decimal marks, and labels."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Identifications as JSON; every line that cannot be used is named."""
 
-from __future__ import annotations
-
 import io
 import json
 import math

@@ -1,7 +1,5 @@
 """Truth in CSV files; every file and line that cannot be used is named."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """Packets as ffmpeg_image_transport sends them, encoded here, and the images in them."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from fractions import Fraction
 from types import SimpleNamespace

@@ -1,7 +1,5 @@
 """Encoded images that are cut, have holes, or carry more than their pixels."""
 
-from __future__ import annotations
-
 import os
 import struct
 from threading import Thread

@@ -1,7 +1,5 @@
 """Several results of one image, settled by how many agree."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Stacks of images in AHF: the combination is chosen by the identification."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The settings of an identification, and the builder that every way in uses."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

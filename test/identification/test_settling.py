@@ -1,7 +1,5 @@
 """Evidence for families where all are looked for: of one image, and of images together."""
 
-from __future__ import annotations
-
 import json
 import math
 from collections import Counter

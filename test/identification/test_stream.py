@@ -1,7 +1,5 @@
 """A sequence of images that is identified in order."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

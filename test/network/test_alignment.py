@@ -1,7 +1,5 @@
 """Alignment to nominal coordinates, with the covariance of what comes out."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Literal
 

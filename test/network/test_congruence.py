@@ -1,7 +1,5 @@
 """The congruence test of two epochs, on adjusted bundles and on exact points."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

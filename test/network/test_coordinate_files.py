@@ -1,7 +1,5 @@
 """Known coordinates from files: what is in them, in which unit, and what is refused."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

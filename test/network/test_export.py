@@ -1,7 +1,5 @@
 """Exports, read back by other software where there is some, and by readers of their own."""
 
-from __future__ import annotations
-
 import csv
 import math
 import runpy

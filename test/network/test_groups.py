@@ -1,7 +1,5 @@
 """Groups of photographs that do not hang together."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

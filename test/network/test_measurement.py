@@ -1,7 +1,5 @@
 """Distances, deviations and errors of calibrated lengths."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Cameras on a robot's hand, beside its base and on each other, against what was simulated."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import cv2

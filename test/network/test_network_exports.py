@@ -1,7 +1,5 @@
 """Adjusted networks for other software, read back by readers that share nothing with them."""
 
-from __future__ import annotations
-
 import csv
 import math
 import xml.etree.ElementTree as ElementTree

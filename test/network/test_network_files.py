@@ -1,7 +1,5 @@
 """Networks from files: image points, cameras, scale bars and control points."""
 
-from __future__ import annotations
-
 import json
 import struct
 from collections.abc import Mapping

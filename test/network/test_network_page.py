@@ -1,7 +1,5 @@
 """The page of a network, and its table on the terminal."""
 
-from __future__ import annotations
-
 import io
 import json
 import re

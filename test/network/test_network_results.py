@@ -1,7 +1,5 @@
 """Adjusted networks as files, written and read back."""
 
-from __future__ import annotations
-
 import csv
 import json
 from collections.abc import Callable

@@ -4,8 +4,6 @@ The formulas are those of the manuals or sources that the modules name; nothing 
 writes the files.
 """
 
-from __future__ import annotations
-
 import csv
 import json
 import math

@@ -1,7 +1,5 @@
 """Networks that nobody gave approximate values for: exact projections with noise, and refusals."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache

@@ -1,7 +1,5 @@
 """The pose of one image: covariances by Monte Carlo, wrong IDs, second poses, and refusals."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

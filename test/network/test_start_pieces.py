@@ -1,7 +1,5 @@
 """Relative orientation, planar poses, resection and triangulation on exact projections."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Deviations from what is known, and what to photograph next."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Whether a measurement is good, in words and numbers."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Diagnostics of the node `detector`."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

@@ -1,7 +1,5 @@
 """Drivers of scanners, with the layout of their messages, and the nodes of `rig.launch.py`."""
 
-from __future__ import annotations
-
 import array
 import json
 import os

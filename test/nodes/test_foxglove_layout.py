@@ -1,7 +1,5 @@
 """docs/foxglove_layout.json against a node that runs."""
 
-from __future__ import annotations
-
 import importlib
 import json
 import re

@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 import pytest
 
 from ahf_ros.base.settings.nested import flat_parameters

@@ -1,7 +1,5 @@
 """Which images of a queue are identified, which are dropped, and what is said of them."""
 
-from __future__ import annotations
-
 import threading
 from typing import Any
 from unittest import mock

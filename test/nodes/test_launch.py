@@ -1,7 +1,5 @@
 """The launch files, read by launch where it is installed, and by a stand-in everywhere."""
 
-from __future__ import annotations
-
 import os
 import runpy
 import sys

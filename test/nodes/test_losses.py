@@ -1,7 +1,5 @@
 """Gaps in the numbers of messages are losses only where one publisher made them."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 
 import pytest

@@ -1,7 +1,5 @@
 """Messages of what was identified, as the nodes publish them."""
 
-from __future__ import annotations
-
 import math
 from functools import partial
 from types import SimpleNamespace

@@ -1,7 +1,5 @@
 """The nodes as processes of their own, over DDS."""
 
-from __future__ import annotations
-
 import array
 import itertools
 import math

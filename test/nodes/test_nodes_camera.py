@@ -1,7 +1,5 @@
 """The node `detector` with the topics that image_transport puts beside those of the images."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Nodes that end, or do not even start: in order, and without a traceback."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

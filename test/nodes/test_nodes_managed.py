@@ -1,7 +1,5 @@
 """The node `detector` with a lifecycle, over DDS."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

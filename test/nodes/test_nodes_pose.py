@@ -1,7 +1,5 @@
 """The node `pose` over real DDS: every message is answered, and what is wrong is said."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable, Iterator
 from copy import copy

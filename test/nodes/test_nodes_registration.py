@@ -1,7 +1,5 @@
 """The node `registration` over DDS: scans of an object from all around."""
 
-from __future__ import annotations
-
 import json
 from importlib.util import find_spec
 from pathlib import Path

@@ -1,7 +1,5 @@
 """What a detector says of what it was given and what it sees, with what to set instead."""
 
-from __future__ import annotations
-
 import array
 import re
 from pathlib import Path

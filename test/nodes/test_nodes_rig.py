@@ -1,7 +1,5 @@
 """A rig over DDS: a scanner whose cloud belongs to its image, viewers, several cameras."""
 
-from __future__ import annotations
-
 import array
 import math
 from dataclasses import replace

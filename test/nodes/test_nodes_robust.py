@@ -1,7 +1,5 @@
 """The detector where what it talks to does not behave: processes that die, clocks that jump."""
 
-from __future__ import annotations
-
 import math
 import os
 import subprocess

@@ -1,7 +1,5 @@
 """What the detector says when something is not as it should be, and what to do about it."""
 
-from __future__ import annotations
-
 import os
 import signal
 from pathlib import Path

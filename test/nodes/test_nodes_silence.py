@@ -1,7 +1,5 @@
 """A triggered scanner, its silence and its end, and images that nobody asks for."""
 
-from __future__ import annotations
-
 import os
 import random
 import subprocess

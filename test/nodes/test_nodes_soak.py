@@ -11,8 +11,6 @@ The environment variable AHF_SOAK says how many images are sent. From 5000 on, t
 its memory as well.
 """
 
-from __future__ import annotations
-
 import os
 import time
 from collections import Counter

@@ -1,7 +1,5 @@
 """Stacks of images in the node `detector`, as a process of its own, over DDS."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """When silence on a topic is worth a warning, by a clock that is given its times."""
 
-from __future__ import annotations
-
 import os
 import random
 import subprocess

@@ -1,7 +1,5 @@
 """From an image message to the message that answers it, without a node round it."""
 
-from __future__ import annotations
-
 import gc
 import threading
 import weakref

@@ -1,7 +1,5 @@
 """Overrides of the quality of service."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

@@ -1,7 +1,5 @@
 """The example of a rig in docs/examples, with the answers to rendered images of two cameras."""
 
-from __future__ import annotations
-
 import csv
 import runpy
 

@@ -1,7 +1,5 @@
 """The layouts of RViz and Foxglove for a rig, against what the nodes publish."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterator
 from typing import Any

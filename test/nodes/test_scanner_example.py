@@ -1,7 +1,5 @@
 """The nodes of `rig.launch.py` with scans of a box that docs/examples renders, and a recording."""
 
-from __future__ import annotations
-
 import runpy
 import time
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """Who may do what: programs only at the start, and a policy that fits the node."""
 
-from __future__ import annotations
-
 import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """The detector that calls a ROS 2 service, in one process with the service."""
 
-from __future__ import annotations
-
 import threading
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any

@@ -1,7 +1,5 @@
 """What the parameters of nodes accept, and those that a node does not have."""
 
-from __future__ import annotations
-
 import pytest
 
 pytest.importorskip('rclpy', reason='ROS 2 is not installed')

@@ -1,7 +1,5 @@
 """The tree of frames that a node adds to."""
 
-from __future__ import annotations
-
 import pytest
 
 pytest.importorskip('rclpy', reason='ROS 2 is not installed')

@@ -1,7 +1,5 @@
 """The example of a trigger in docs/examples, with that of a scanner and a detector."""
 
-from __future__ import annotations
-
 import csv
 import os
 import runpy

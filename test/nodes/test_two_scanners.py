@@ -1,7 +1,5 @@
 """Two launches of `rig.launch.py` in namespaces, two rendered scanners, one registration."""
 
-from __future__ import annotations
-
 import runpy
 import time
 from typing import Any

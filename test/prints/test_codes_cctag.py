@@ -1,7 +1,5 @@
 """CCTags: the radii of their circles, and their IDs."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

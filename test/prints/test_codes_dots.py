@@ -1,7 +1,5 @@
 """Rings of dots: words and design (METHOD.md, section 7)."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """GSI's targets: design, values, and libraries as data files (METHOD.md, section 6)."""
 
-from __future__ import annotations
-
 import json
 import os
 from itertools import combinations

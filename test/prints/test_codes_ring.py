@@ -1,7 +1,5 @@
 """Tables, directions and distances of the ring code families (METHOD.md, section 5)."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The dictionaries of square markers."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Any
 

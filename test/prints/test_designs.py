@@ -1,7 +1,5 @@
 """Outlines of printed targets, against the ink of rendered ones."""
 
-from __future__ import annotations
-
 import math
 import re
 from pathlib import Path

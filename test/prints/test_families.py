@@ -1,7 +1,5 @@
 """Lists of families, and the IDs that families have."""
 
-from __future__ import annotations
-
 import json
 import pickle
 import shutil

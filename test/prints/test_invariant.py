@@ -1,7 +1,5 @@
 """The P2-invariant, and the worked example of Wang et al. (Tables 3 to 5)."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

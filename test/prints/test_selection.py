@@ -1,7 +1,5 @@
 """Sets of words that are hard to confuse, against their definition and what was measured."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from itertools import combinations

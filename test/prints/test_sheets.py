@@ -1,7 +1,5 @@
 """Sheets of targets: nothing overlaps, everything is on the page, and lengths are right."""
 
-from __future__ import annotations
-
 import json
 import math
 import re

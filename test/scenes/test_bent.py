@@ -1,7 +1,5 @@
 """Pictures of bent sheets: geometry, ink and light agree with what is computed in another way."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Figures against truth: what counts as what, on cases small enough to count by hand."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

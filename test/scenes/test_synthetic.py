@@ -1,7 +1,5 @@
 """Synthetic images: their truth is exact, the codes are the printed ones, the light is as told."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

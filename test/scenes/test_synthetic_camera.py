@@ -1,7 +1,5 @@
 """The camera's geometry and its sensor."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

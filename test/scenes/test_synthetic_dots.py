@@ -1,7 +1,5 @@
 """Prints of point-distributed targets and of rings of dots; ink that is gained, in any family."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Patterns of light have the sizes they are named for, and fall off as light does."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

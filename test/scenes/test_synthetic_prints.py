@@ -1,7 +1,5 @@
 """Prints are put into the image without bias."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Advice where nothing is found: only what a second look at the image measures."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import replace
 from pathlib import Path

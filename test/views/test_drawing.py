@@ -1,7 +1,5 @@
 """Overlays: the image stays, each target gets the colour of what it is."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The page of a report, in a real browser, and what becomes of it where something fails."""
 
-from __future__ import annotations
-
 import errno
 import os
 import re

@@ -1,7 +1,5 @@
 """What a report reads: results in files and folders, images that moved, pictures that fit."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from pathlib import Path

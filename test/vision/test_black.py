@@ -1,7 +1,5 @@
 """Ink that is blacker than ink: clipped images, and drawings that were never printed."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Candidates: votes for the centres of dots, counted in cells, and their peaks between them."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

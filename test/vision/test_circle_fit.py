@@ -1,7 +1,5 @@
 """Frames fitted to edges: exact where the edges are, robust, and honest about their errors."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

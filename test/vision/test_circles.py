@@ -1,7 +1,5 @@
 """Where edges of circles are expected."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Dots that detectors of several kinds look for once."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

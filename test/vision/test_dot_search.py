@@ -1,7 +1,5 @@
 """The dots of an image: found whole or interrupted, once each, and not where explained."""
 
-from __future__ import annotations
-
 from functools import cache
 from types import SimpleNamespace
 

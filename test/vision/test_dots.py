@@ -1,7 +1,5 @@
 """Dots: pairs that are near to each other, and those that are the same."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

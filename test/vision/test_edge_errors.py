@@ -1,7 +1,5 @@
 """Covariances of edges: errors in common make them larger, errors of single edges do not."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

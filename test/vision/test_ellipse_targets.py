@@ -1,7 +1,5 @@
 """Targets made from frames."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import asdict
 

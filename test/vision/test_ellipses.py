@@ -1,7 +1,5 @@
 """Ellipses of dots: fitted about candidates, refined, and lost where there is no edge."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import cv2

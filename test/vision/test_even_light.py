@@ -1,7 +1,5 @@
 """Seams of light between the patterns of a stack."""
 
-from __future__ import annotations
-
 import cv2
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """Parts of faint contrast: which they are, and how they are stretched."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import cv2

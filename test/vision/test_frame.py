@@ -1,7 +1,5 @@
 """Frames: what they map where, how they change, what they say of ellipses."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Homographies of small flat objects."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Movement between images of one scene, in light that changes."""
 
-from __future__ import annotations
-
 from functools import cache
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The noise of an image is told from edges of light."""
 
-from __future__ import annotations
-
 import cv2
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """Steps fitted to profiles: exact where the step is exact."""
 
-from __future__ import annotations
-
 from math import erf
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Pyramids: their halves, logarithms and edges, and the octaves of radii in them."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import numpy as np

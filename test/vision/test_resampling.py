@@ -1,7 +1,5 @@
 """Images that are too long for OpenCV are interpolated in parts, as others are."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Robust statistics: exact without outliers, and little moved by them."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

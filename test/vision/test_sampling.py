@@ -1,7 +1,5 @@
 """Gray values at points, on lines and on circles."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Small dots in even light."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

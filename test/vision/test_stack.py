@@ -1,7 +1,5 @@
 """Combinations of images of one scene."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import cv2
