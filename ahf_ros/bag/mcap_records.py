@@ -1,7 +1,5 @@
 """The records of MCAP files without their index: of cut files, too, up to the last whole one."""
 
-from __future__ import annotations
-
 import struct
 from collections.abc import Callable, Generator, Iterator
 from contextlib import suppress

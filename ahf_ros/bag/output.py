@@ -5,8 +5,6 @@ image is one transaction, so a process that is killed at any moment leaves the r
 earlier images.
 """
 
-from __future__ import annotations
-
 import json
 import re
 import shutil

@@ -4,8 +4,6 @@ It reads the finished bag alone, so that it can be done again, and takes answers
 the same functions as the nodes `detector` and `registration`.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass, field

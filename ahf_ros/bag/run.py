@@ -5,8 +5,6 @@ First, the results of all images are written to a journal in the folder of the n
 replaces the journal. A run that was killed continues where it stopped.
 """
 
-from __future__ import annotations
-
 import json
 import re
 import sqlite3

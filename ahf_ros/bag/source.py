@@ -6,8 +6,6 @@ their beginning by mcap. SQLite files that rosbags refuses are copied as far as 
 damage ends its file there.
 """
 
-from __future__ import annotations
-
 import re
 import sqlite3
 from collections import Counter

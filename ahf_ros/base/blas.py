@@ -8,8 +8,6 @@ Where threadpoolctl is not installed, as beside packages of ROS, which have no k
 is limited here: nodes set `OPENBLAS_NUM_THREADS`, and others may.
 """
 
-from __future__ import annotations
-
 import sys
 import threading
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """Names and orders of arguments that are given up: they work for one more release, and warn."""
 
-from __future__ import annotations
-
 import inspect
 import warnings
 from collections.abc import Callable, Mapping

@@ -1,7 +1,5 @@
 """Why targets are reported whose confidence is low, and others are not that are certain."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Mapping, Sequence
 

@@ -7,8 +7,6 @@ thirds of the standard deviation of its blur. Edges of wide marks do not show wh
 have a gamma.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from statistics import median
 

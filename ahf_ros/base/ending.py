@@ -5,8 +5,6 @@ exception may be lost or become another one, because C code discards or replaces
 expect. So `interrupt` waits for the end of an import, and loops that go on call `check`.
 """
 
-from __future__ import annotations
-
 import os
 import select
 import signal

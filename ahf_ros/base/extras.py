@@ -1,7 +1,5 @@
 """What needs a package that `pip install ahf_ros` leaves out, and how to install that."""
 
-from __future__ import annotations
-
 from importlib.util import find_spec
 from typing import NamedTuple
 

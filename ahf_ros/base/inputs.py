@@ -4,8 +4,6 @@ What options name is registered where they are parsed, and what that refers to, 
 of results, where it is read. A library that reads and writes files has no such list.
 """
 
-from __future__ import annotations
-
 import os
 import stat
 from collections.abc import Iterable, Iterator

@@ -1,7 +1,5 @@
 """What is said once of an image, however often it is searched: that some of many are left out."""
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Iterator
 from contextlib import contextmanager

@@ -4,8 +4,6 @@ Every function that reads what a user names is a `reader`: whatever a parser rai
 a ValueError. URLs are those of whatever storage fsspec reaches: https://, s3://, memory://, ...
 """
 
-from __future__ import annotations
-
 import codecs
 import json
 import os

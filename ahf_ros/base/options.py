@@ -1,7 +1,5 @@
 """The types of settings that functions take by keyword; scripts/write_options.py writes them."""
 
-from __future__ import annotations
-
 from typing import Literal, TypedDict
 
 

@@ -4,8 +4,6 @@ Neither tags nor merges are accepted, so a text can make nothing but mappings, l
 numbers, truth values and None.
 """
 
-from __future__ import annotations
-
 import re
 from typing import Any, NoReturn
 

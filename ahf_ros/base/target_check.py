@@ -3,8 +3,6 @@
 Detectors of other packages, commands, services and refinements pass it. Nothing else checks.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from contextlib import suppress

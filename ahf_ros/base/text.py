@@ -1,7 +1,5 @@
 """Untrusted text, made fit for logs, terminals, JSON and messages."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 MAXIMUM_LENGTH = 300

@@ -9,8 +9,6 @@ the same run. No output takes the place of an input (`ahf_ros.base.inputs`).
 Writes and `fsync` raise auditing events (PEP 578), as the functions of `os` do by themselves.
 """
 
-from __future__ import annotations
-
 import errno
 import json
 import os

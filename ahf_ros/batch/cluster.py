@@ -11,8 +11,6 @@ References
    of the 14th Python in Science Conference, 2015.
 """
 
-from __future__ import annotations
-
 import asyncio
 import logging
 import math

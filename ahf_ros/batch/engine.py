@@ -1,7 +1,5 @@
 """What processes tasks: the contract of engines, and the loop that feeds them."""
 
-from __future__ import annotations
-
 import math
 import os
 from collections.abc import Callable, Iterable, Iterator

@@ -1,7 +1,5 @@
 """The job of a batch: identification of the images of a task, and messages about it."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import asdict

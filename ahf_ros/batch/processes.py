@@ -7,8 +7,6 @@ ends when that pipe is closed, at the latest when the process that started it is
 again.
 """
 
-from __future__ import annotations
-
 import os
 import select
 import signal

@@ -5,8 +5,6 @@ the result depends on. A result counts as long as that is what it would depend o
 that a killed process left unfinished does not count.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 import os

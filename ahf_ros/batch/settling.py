@@ -1,7 +1,5 @@
 """The families of a batch, settled before its images are identified each on their own."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 

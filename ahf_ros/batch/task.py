@@ -1,7 +1,5 @@
 """The images of a task and what becomes of them: records that processes and machines exchange."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field, replace
 from enum import IntEnum
 from typing import Any

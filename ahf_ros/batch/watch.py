@@ -1,7 +1,5 @@
 """A batch without an end: the images that arrive in a folder."""
 
-from __future__ import annotations
-
 import os
 import time
 from collections.abc import Callable, Collection, Iterator

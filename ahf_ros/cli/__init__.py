@@ -5,8 +5,6 @@ exit status is 0; 1 if a file could not be read or written, while the others are
 argument is not accepted; 3 if `ahf orient` wrote all, but what it was given does not agree.
 """
 
-from __future__ import annotations
-
 import os
 import sys
 from collections.abc import Sequence

@@ -37,9 +37,9 @@ from ahf_ros.families import is_foreign
 from ahf_ros.identification.session_settings import IdentificationSettings, StackSettings
 
 if TYPE_CHECKING:
+    from ahf_ros.bag.output import Outcome
     from ahf_ros.bag.registration import Registered, RegistrationTask
     from ahf_ros.bag.run import BagTask
-from ahf_ros.bag.output import Outcome
 
 _Result = list['Outcome | Registered | ValueError']
 """What became of a bag, part by part."""

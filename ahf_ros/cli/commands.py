@@ -1,7 +1,5 @@
 """The commands of `ahf`; the module of each is imported only where it is called."""
 
-from __future__ import annotations
-
 import argparse
 import os
 import sys

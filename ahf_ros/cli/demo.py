@@ -1,7 +1,5 @@
 """The method in one command: the same image under projected light, identified in three ways."""
 
-from __future__ import annotations
-
 import argparse
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """`ahf doctor`: what is installed, and what is missing for what, as a text for a bug report."""
 
-from __future__ import annotations
-
 import argparse
 import importlib.util
 import os

@@ -1,7 +1,5 @@
 """`ahf evaluate`: identified targets compared with the truth."""
 
-from __future__ import annotations
-
 import argparse
 import json
 import sys

@@ -1,7 +1,5 @@
 """Command line options: from settings, and those that several commands have."""
 
-from __future__ import annotations
-
 import argparse
 import os
 import sys

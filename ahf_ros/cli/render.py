@@ -1,7 +1,5 @@
 """`ahf render`: synthetic images and their truth."""
 
-from __future__ import annotations
-
 from argparse import ArgumentParser, Namespace
 from collections.abc import Iterator
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """`ahf report`: results as one page to look at."""
 
-from __future__ import annotations
-
 import argparse
 from functools import partial
 from pathlib import Path

@@ -1,7 +1,5 @@
 """`ahf targets`: sheets of targets to print."""
 
-from __future__ import annotations
-
 import argparse
 
 from ahf_ros.base.text import counted

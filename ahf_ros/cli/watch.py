@@ -1,7 +1,5 @@
 """`ahf watch`: the coded targets in the images that arrive in a folder."""
 
-from __future__ import annotations
-
 import argparse
 import sys
 from contextlib import closing, redirect_stdout

@@ -3,8 +3,6 @@
 The command line needs this before it computes anything, so nothing is imported here that does.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from ahf_ros.base.settings.parameter import check_parameters, parameter

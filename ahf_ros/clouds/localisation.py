@@ -22,8 +22,6 @@ It counts the noise of the points as independent of each other, and is never zer
 rounded to float32.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from contextlib import suppress

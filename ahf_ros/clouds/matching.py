@@ -1,7 +1,5 @@
 """Pairs of messages by their stamps: images and clouds of one shot."""
 
-from __future__ import annotations
-
 import threading
 import time
 from collections import deque

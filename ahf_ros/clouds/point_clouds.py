@@ -4,8 +4,6 @@
 of the whole cloud if the byte order differs, and does not say what is wrong with a bad cloud.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Registered scans as files: clouds in the common frame, transforms and targets."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Settings of a registration, declared once for the node and for the commands."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import dataclass
 from typing import Any

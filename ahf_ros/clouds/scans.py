@@ -1,7 +1,5 @@
 """Scans on their way into one frame: the same from messages, bags and files."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Arrays in npz archives, whose headers are checked before anything is unpacked."""
 
-from __future__ import annotations
-
 import io
 import math
 import zipfile

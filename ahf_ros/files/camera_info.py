@@ -1,7 +1,5 @@
 """Calibrations of cameras from messages, and points and targets without distortion of the lens."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace

@@ -12,8 +12,6 @@ References
 .. [2] The Stanford 3D scanning repository, graphics.stanford.edu/data/3Dscanrep.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The camera and the focal length that an image file notes in its Exif data (CIPA DC-008)."""
 
-from __future__ import annotations
-
 import math
 import warnings
 from contextlib import suppress

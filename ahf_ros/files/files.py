@@ -1,7 +1,5 @@
 """Names of files, and tables in CSV in which a spreadsheet computes nothing."""
 
-from __future__ import annotations
-
 import csv
 import io
 from collections.abc import Iterable, Sequence

@@ -5,8 +5,6 @@ takes 1.1 GB for a PNG file of 0.5 MB. Pillow, one more dependency, opens neithe
 float64 nor colour ones of float32, and does not say where in a file the orientation is.
 """
 
-from __future__ import annotations
-
 import math
 import re
 import struct

@@ -1,7 +1,5 @@
 """Images of HEIC, as phones take them, decoded by libheif: OpenCV does not know the format."""
 
-from __future__ import annotations
-
 from io import BytesIO
 
 import cv2

@@ -1,7 +1,5 @@
 """HTML pages that need no other file: a folder has the template, the styles and the scripts."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterable
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Images in files, and images that are encoded as in files."""
 
-from __future__ import annotations
-
 import struct
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

@@ -4,8 +4,6 @@ The encodings of sensor_msgs/image_encodings.hpp that hold an image are read. Va
 range: a 12-bit camera's or a float scanner's are not scaled before the logarithm.
 """
 
-from __future__ import annotations
-
 import struct
 import zlib
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """The chunks of PNG files (ISO/IEC 15948), read without decoding anything."""
 
-from __future__ import annotations
-
 import struct
 from collections.abc import Iterator
 

@@ -4,8 +4,6 @@ Cells are separated by tabs, semicolons or commas. Where they are not separated 
 may have decimal commas, all of them or none. Every error names line and column.
 """
 
-from __future__ import annotations
-
 import csv
 import math
 import re

@@ -1,7 +1,5 @@
 """Identifications as JSON: what `ahf identify --json` prints, and other programs may print."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, fields

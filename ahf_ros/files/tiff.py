@@ -1,7 +1,5 @@
 """The directories of TIFF 6.0 and BigTIFF files, read without decoding anything."""
 
-from __future__ import annotations
-
 import struct
 from dataclasses import dataclass
 

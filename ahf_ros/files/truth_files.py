@@ -1,7 +1,5 @@
 """Tables of the targets that images show, as CSV files."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from ahf_ros.base.opening import reader

@@ -4,8 +4,6 @@ ffmpeg_image_transport sends each image as a packet of H.264, HEVC or another co
 Nearly every packet needs those before it, from the last key frame on.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Whether an encoded image is whole: decoders fill up what is missing, and return an image."""
 
-from __future__ import annotations
-
 import os
 import re
 import struct

@@ -4,8 +4,6 @@ The command line needs them before it knows whether it computes anything, so not
 here that does.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 
 from ahf_ros.base.settings.parameter import check_parameters, parameter

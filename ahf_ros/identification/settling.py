@@ -7,8 +7,6 @@ others, where its targets are painted over; what is there shows itself within so
 none of them takes much longer.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace

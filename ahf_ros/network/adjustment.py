@@ -1,7 +1,5 @@
 """Bundle adjustment: from approximate values and observations to coordinates."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

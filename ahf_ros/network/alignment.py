@@ -15,8 +15,6 @@ which changes no fit (Rao, Linear Statistical Inference, 1973, 4i.4): a free net
 that hold its datum is fitted with equal weights, since its covariance has no say about its frame.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal

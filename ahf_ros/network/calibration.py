@@ -11,8 +11,6 @@ References
 .. [2] Luhmann et al., Close-Range Photogrammetry and 3D Imaging, 3rd ed. 2019, 4.4 and 7.3.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from ahf_ros.network.camera import PARAMETERS, known_calibration, parameters_of

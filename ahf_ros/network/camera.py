@@ -26,8 +26,6 @@ References
    wide-angle, and fish-eye lenses, IEEE Trans. PAMI 28 (8), 2006, 1335-1340.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -20,8 +20,6 @@ References
 .. [2] Niemeier, Ausgleichungsrechnung, 2nd ed., De Gruyter 2008.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -11,8 +11,6 @@ References
 .. [2] Baarda, S-transformations and criterion matrices, Netherlands Geodetic Commission 1973.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Literal
 

@@ -1,7 +1,5 @@
 """Known lengths and coordinates beside those of an adjusted network."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -9,8 +9,6 @@ References
 .. [1] Förstner & Wrobel, Photogrammetric Computer Vision, Springer 2016, 4.5 and 15.4.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Whether a lens is described by its model as far as the border of its images."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import replace
 

@@ -4,8 +4,6 @@ Standard deviations come from the whole covariance: that of a distance depends o
 are correlated, and not on the frame.
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

@@ -18,8 +18,6 @@ References
 .. [2] Strobl & Hirzinger, Optimal hand-eye calibration, IROS 2006: a metric of all errors.
 """
 
-from __future__ import annotations
-
 from collections import defaultdict
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, replace

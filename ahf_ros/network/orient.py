@@ -1,7 +1,5 @@
 """From image points and IDs to coordinates, and in words why where that is not possible."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial

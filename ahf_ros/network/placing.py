@@ -4,8 +4,6 @@ Here gross contradictions are found, before an adjustment would spread them over
 other units, mirrored axes, exchanged names. Small ones are left to the tests of the adjustment.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from itertools import combinations, islice
 

@@ -3,8 +3,6 @@
 Collins and Bartoli (2014), Infinitesimal Plane-based Pose Estimation.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import cv2

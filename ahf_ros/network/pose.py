@@ -1,7 +1,5 @@
 """The pose of a camera among known targets, from one image."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from ahf_ros.network.network import FloatArray, Rejection

@@ -5,8 +5,6 @@ on anything else being known (Förstner & Wrobel, Photogrammetric Computer Visio
 15.3).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

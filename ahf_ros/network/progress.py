@@ -3,8 +3,6 @@
 The stages tell what they do by one line each, so that none of them has a parameter for it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar

@@ -3,8 +3,6 @@
 What is usual of lenses is an observation, while nothing better is known of a camera.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

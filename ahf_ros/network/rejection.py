@@ -6,8 +6,6 @@ between both fits none. So the rays of an ID are split into groups that meet, la
 whatever the adjustment thought of each.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace

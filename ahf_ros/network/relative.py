@@ -4,8 +4,6 @@ An essential matrix (Nister 2004, five points) and a homography are estimated si
 geometric robust information criterion (1998, GRIC) orders what comes out of them.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The pose of a photograph of known points: P3P from many samples, then weighted least squares."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 

@@ -1,7 +1,5 @@
 """Similarity transformations of points, of their covariance, and of a network."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field, replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The pose of one image from known targets and a known camera, or why it is not determined."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace

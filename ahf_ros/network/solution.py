@@ -3,8 +3,6 @@
 Groups of photographs that do not hang together are solutions of their own.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property

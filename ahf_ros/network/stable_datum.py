@@ -8,8 +8,6 @@ Bonferroni's correction, are the other way round. So both are made, at shares of
 sum is a little above one, since both often fail together.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

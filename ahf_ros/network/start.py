@@ -5,8 +5,6 @@ the points that enough of its photographs see. Photographs that do not hang toge
 are oriented each group by itself.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import islice

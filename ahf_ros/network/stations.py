@@ -1,7 +1,5 @@
 """The stations of a network: where a robot's hand was, or which photographs a rig took at once."""
 
-from __future__ import annotations
-
 from collections import Counter, defaultdict
 from collections.abc import Mapping
 from contextlib import suppress

@@ -1,7 +1,5 @@
 """How strong the geometry of a network is, and what to photograph next where it is weak."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple

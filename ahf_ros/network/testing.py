@@ -13,8 +13,6 @@ References
    Assoc. 84 (1989), 881-896; the likelihood is that of a distribution which ends at the longest.
 """
 
-from __future__ import annotations
-
 from importlib import import_module
 from types import ModuleType
 from typing import NamedTuple

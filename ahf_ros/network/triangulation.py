@@ -3,8 +3,6 @@
 Rays are given by normalised image coordinates, so nothing here knows a lens.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from itertools import combinations
 

@@ -3,8 +3,6 @@
 Two photographs of a plane have two relative orientations and fit any focal length; three do not.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations

@@ -1,7 +1,5 @@
 """Units of length that coordinates may have, and how many decimals are shown of them."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable
 

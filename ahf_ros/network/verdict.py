@@ -8,8 +8,6 @@ References
 .. [1] Luhmann et al., Close-Range Photogrammetry and 3D Imaging, 3rd ed. 2019, 7.1.
 """
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """Observations by photograph, and which of them agree with approximate values."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -4,8 +4,6 @@ Each gets a camera of its own, which starts where the photograph alone fits. Aft
 whose focal lengths are the same to within their precision are one again.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache

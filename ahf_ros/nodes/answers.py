@@ -1,7 +1,5 @@
 """Everything that a node publishes about an image that it has identified."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 from importlib import import_module

@@ -1,7 +1,5 @@
 """Positions of the targets of an image in space, from the point cloud of the same shot."""
 
-from __future__ import annotations
-
 import threading
 from operator import attrgetter
 

@@ -1,7 +1,5 @@
 """The node `detector`: images in, identified targets out."""
 
-from __future__ import annotations
-
 import threading
 import time
 import traceback

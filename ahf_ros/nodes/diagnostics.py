@@ -1,7 +1,5 @@
 """The status of nodes on /diagnostics, and what the nodes `detector` and `pose` count."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping
 from copy import copy
 from dataclasses import dataclass, field, replace

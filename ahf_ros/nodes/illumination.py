@@ -1,7 +1,5 @@
 """The node `illumination`: synthetic images of targets under projected light, with their truth."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from itertools import cycle
 from typing import NamedTuple

@@ -5,8 +5,6 @@ silent when newer messages replaced 188 of 200 in the queue of a reliable subscr
 that publishers give their messages showed them all.
 """
 
-from __future__ import annotations
-
 import threading
 import time
 from collections.abc import Callable, Hashable, Mapping

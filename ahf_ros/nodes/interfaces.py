@@ -3,8 +3,6 @@
 `--help` of the nodes, the table of docs/ros.md, the launch files and tests read them here.
 """
 
-from __future__ import annotations
-
 import json
 import textwrap
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """What the launch files have in common: arguments with texts and choices, and the nodes."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from difflib import get_close_matches
 from functools import partial

@@ -5,8 +5,6 @@ visualization_msgs/ImageMarker. A viewer shows one marker per topic, so that all
 of one marker. Markers have no text: IDs are drawn into the debug image.
 """
 
-from __future__ import annotations
-
 import array
 import math
 import sys

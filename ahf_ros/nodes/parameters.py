@@ -1,7 +1,5 @@
 """ROS parameters from settings dataclasses."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection, Iterable, Iterator
 from contextlib import suppress
 from difflib import get_close_matches

@@ -1,7 +1,5 @@
 """When silence on a topic means something: a clock that is given its times."""
 
-from __future__ import annotations
-
 from collections.abc import Hashable
 
 UNKNOWN, TRIGGERED, CONTINUOUS = 'unknown', 'triggered', 'continuous'

@@ -1,7 +1,5 @@
 """What the node `detector` does with an image while its parameters stay as they are."""
 
-from __future__ import annotations
-
 import threading
 from collections import deque
 from functools import partial

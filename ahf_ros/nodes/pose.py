@@ -1,7 +1,5 @@
 """The node `pose`: where the camera of each image is among targets of known coordinates."""
 
-from __future__ import annotations
-
 import time
 from contextlib import suppress
 from functools import partial

@@ -1,7 +1,5 @@
 """Node start-up and shutdown."""
 
-from __future__ import annotations
-
 import ctypes
 import os
 import re

@@ -6,8 +6,6 @@ participant, the vendor (0 and 1), the host (2 and 3) and the lower half of the 
 5), so that on Linux its process can be looked for.
 """
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterable, Sequence
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The node `registration`: scans in, one frame for all of them out."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial

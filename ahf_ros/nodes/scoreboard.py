@@ -1,7 +1,5 @@
 """The node `scoreboard`: how well the targets of every image were identified."""
 
-from __future__ import annotations
-
 from ahf_ros.files.image_messages import nanoseconds
 from ahf_ros.files.target_messages import identification_from, is_answered
 from ahf_ros.msg import CodedTargetArray

@@ -1,7 +1,5 @@
 """A detector that calls a ROS 2 service, so that it can be written in any language."""
 
-from __future__ import annotations
-
 import queue
 import threading
 import time

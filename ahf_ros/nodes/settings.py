@@ -1,7 +1,5 @@
 """Settings of the nodes; importable without ROS."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace

@@ -1,7 +1,5 @@
 """Entry points of the nodes: a signal that comes during the imports ends them in order, too."""
 
-from __future__ import annotations
-
 import atexit
 import os
 import sys

@@ -1,7 +1,5 @@
 """Frames on /tf or /tf_static: each has one parent, and no frame is its own ancestor (REP 105)."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from importlib import import_module
 from typing import Any

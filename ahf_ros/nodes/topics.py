@@ -5,8 +5,6 @@ publisher received none of 10 best-effort messages, nor any after a replay had c
 effort. `QoSOverridingOptions` of rclpy accepts a depth of 0 and does not say what it accepts.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from importlib import import_module
 from typing import Any

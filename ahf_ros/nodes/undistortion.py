@@ -1,7 +1,5 @@
 """Centres of targets without the distortion of the lens, from the calibration of the camera."""
 
-from __future__ import annotations
-
 import bisect
 import threading
 from copy import copy

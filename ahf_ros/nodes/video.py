@@ -1,7 +1,5 @@
 """Video in the place of images, as ffmpeg_image_transport sends it."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from ahf_ros.files.video import VideoDecoder

@@ -1,7 +1,5 @@
 """Looks at whether images and clouds arrive, and reports why not, with what to do about it."""
 
-from __future__ import annotations
-
 import re
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence

@@ -1,7 +1,5 @@
 """Code words, printed designs and sheets; here the names of families, all that settings need."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from string import digits
 

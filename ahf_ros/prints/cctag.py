@@ -5,8 +5,6 @@ wide. Read in that order, the highest bit first and 1 where a ring is wide, they
 is left in the middle is white. The tables of radii that the authors print follow this rule.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Families of code words that are read round a circle, so that turned words are one code."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any, ClassVar, TypeVar
 

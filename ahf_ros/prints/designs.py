@@ -1,7 +1,5 @@
 """Outlines of printed targets: closed contours of the shapes of their ink, for printers."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass

@@ -6,8 +6,6 @@ one code, as are its rotations, so that a target may be read from behind. The sm
 them is canonical.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from math import pi, sin
 from pathlib import Path

@@ -5,8 +5,6 @@ positions. The value of a code is the sum of 2^position of its decoding dots. Le
 unit of the printed design, with x to the right and y upwards as printed.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations

@@ -1,7 +1,5 @@
 """What data files describe, kept as long as they do not change."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import lru_cache, wraps
 from pathlib import Path

@@ -9,8 +9,6 @@ is a bare dot, or the one of nothing but marks, unless its file lists that.
 Each family is a data file: see docs/ring_targets.md.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache

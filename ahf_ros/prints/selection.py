@@ -5,8 +5,6 @@ the ground, can turn one word into another. No detector sees a difference then. 
 such conflicts are independent sets of a graph, found by local search.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Square markers: the ArUco and AprilTag dictionaries that OpenCV holds."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cache, lru_cache
 from typing import Any

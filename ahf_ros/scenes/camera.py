@@ -4,8 +4,6 @@ The unit of length on the wall is what the camera sees as one pixel at the princ
 the wall is not tilted. On the wall, x points right and y down, as that camera sees it.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """The ink of everything that is printed on the wall, as functions of the place."""
 
-from __future__ import annotations
-
 import math
 import string
 from collections.abc import Callable, Sequence

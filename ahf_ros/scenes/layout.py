@@ -1,7 +1,5 @@
 """Placement of targets and distractors in the image, without overlap."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

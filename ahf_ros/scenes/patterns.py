@@ -1,7 +1,5 @@
 """Projected light patterns, in projector pixels."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from functools import partial

@@ -1,7 +1,5 @@
 """Marks printed on the wall, drawn into the image without aliasing."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Light that a white wall sends to a camera: of a projector and ambient, on uneven paper."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Rendered photographs of a wall of coded targets: their settings, and their exact truth."""
 
-from __future__ import annotations
-
 import math
 import warnings
 from dataclasses import dataclass, field

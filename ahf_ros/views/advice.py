@@ -8,8 +8,6 @@ Targets are looked for where the dots are few. Where they are many, as in textur
 of spots, only the bands of the clearest ones are looked at.
 """
 
-from __future__ import annotations
-
 import os
 import threading
 from collections import Counter

@@ -1,7 +1,5 @@
 """Nested settings: flattened by name, and assembled again."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
 from typing import Any, TypeVar, get_type_hints

@@ -4,8 +4,6 @@ Settings are frozen dataclasses whose fields are made by `parameter`. ROS parame
 options and tables of the documentation are derived from them.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Iterable

@@ -5,8 +5,6 @@ the frame of each scan, and the coordinates known before any scan. Where there a
 scan holds the frame. Gauss-Newton steps solve for all at once, so that all have their covariance.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

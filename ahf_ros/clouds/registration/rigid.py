@@ -9,8 +9,6 @@ References
 .. [1] Förstner & Wrobel, Photogrammetric Computer Vision, Springer 2016, 10.5.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 

@@ -1,7 +1,5 @@
 """What is registered so far, and how it is taken back."""
 
-from __future__ import annotations
-
 from ahf_ros.base.blas import one_blas_thread
 from ahf_ros.clouds.registration.adjustment import Adjusted, adjusted
 from ahf_ros.clouds.registration.field import Field, RegisteredScan, added, known_field

@@ -17,8 +17,6 @@ References
 .. [1] Shang & Liu, Remote Sens. 2023, 15, 3151.
 """
 
-from __future__ import annotations
-
 import math
 
 from ahf_ros.identification.filtering.genetic import Gene, Values

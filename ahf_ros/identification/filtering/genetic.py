@@ -13,8 +13,6 @@ References
 .. [1] Shang & Liu, Remote Sens. 2023, 15, 3151, section 2.2 and Table 1.
 """
 
-from __future__ import annotations
-
 import math
 import time
 from collections.abc import Callable, Generator, Sequence

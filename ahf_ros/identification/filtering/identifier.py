@@ -10,8 +10,6 @@ References
 .. [1] Shang & Liu, Remote Sens. 2023, 15, 3151.
 """
 
-from __future__ import annotations
-
 import math
 import os
 import time

@@ -1,7 +1,5 @@
 """Settings of adaptive homomorphic filtering."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 
 from ahf_ros.base.settings.parameter import check_parameters, numbers_in, parameter

@@ -1,7 +1,5 @@
 """What exports of adjusted networks share: lenses as others have them, and who shows what."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import PurePath
 from typing import NamedTuple

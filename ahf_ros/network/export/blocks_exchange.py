@@ -9,8 +9,6 @@ References
 .. [1] Bentley, ContextCapture User Guide, BlocksExchange XML/XMLZ format.
 """
 
-from __future__ import annotations
-
 from xml.etree.ElementTree import Element, SubElement
 
 import numpy as np

@@ -10,8 +10,6 @@ References
 .. [1] Snavely, Bundler v0.4 User's Manual, 2009.
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Sequence
 

@@ -4,8 +4,6 @@ COLMAP has (0, 0) at the corner of the first pixel, so that 0.5 is added. Its mo
 and its points no names: `point_labels.csv` has those.
 """
 
-from __future__ import annotations
-
 import os
 import sqlite3
 import tempfile

@@ -4,8 +4,6 @@ Run it with Tools > Run Script. A camera is found by its label or by the name of
 with or without the extension. Markers of the same label are moved; others stay as they are.
 """
 
-from __future__ import annotations
-
 import xml.etree.ElementTree as ElementTree
 from pathlib import Path, PureWindowsPath
 from typing import Any

@@ -1,7 +1,5 @@
 """Surveys as a project in Pix4D's Open Photogrammetry Format (OPF) 1.0."""
 
-from __future__ import annotations
-
 import json
 import math
 import uuid

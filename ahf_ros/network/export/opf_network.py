@@ -5,8 +5,6 @@ R_x(omega) R_y(phi) R_z(kappa). (0, 0) is the corner of the first pixel. T1 and 
 and p2, as Pix4D's own converter to COLMAP has them.
 """
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 from typing import Any

@@ -8,8 +8,6 @@ References
    axis, coordinate and row of each coordinate, `.cxx` the covariance matrix.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

@@ -10,8 +10,6 @@ References
 .. [1] RealityCapture Support, RealityCapture XMP Camera Math, 2020.
 """
 
-from __future__ import annotations
-
 from pathlib import PurePath
 from xml.etree.ElementTree import Element, SubElement, register_namespace
 

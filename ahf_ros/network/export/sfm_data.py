@@ -7,8 +7,6 @@ focal length in mm of a sensor; OpenMVG has one focal length, and its file is wh
 cereal writes.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterator
 from itertools import count

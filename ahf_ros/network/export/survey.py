@@ -1,7 +1,5 @@
 """A survey: measured photographs, the labelled marks in them, and control points."""
 
-from __future__ import annotations
-
 import os
 from collections import defaultdict
 from collections.abc import Collection, Mapping, Sequence

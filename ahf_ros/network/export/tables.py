@@ -1,7 +1,5 @@
 """Surveys as tables: CSV, the ground control of ODM and OpenSfM, and RealityCapture."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from ahf_ros.files.files import csv_table

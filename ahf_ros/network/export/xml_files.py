@@ -5,8 +5,6 @@ centre. Both have our model of the lens with p1 and p2 exchanged; MMVII applies 
 before the distortion, which makes a difference of their product.
 """
 
-from __future__ import annotations
-
 import xml.etree.ElementTree as ElementTree
 from pathlib import Path, PurePath
 from xml.etree.ElementTree import Element, SubElement

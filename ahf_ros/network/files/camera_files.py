@@ -1,7 +1,5 @@
 """Calibrations of cameras as YAML, as ROS and as OpenCV write them."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Callable, Mapping, Sequence

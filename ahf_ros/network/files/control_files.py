@@ -1,7 +1,5 @@
 """Known lengths and coordinates as tables: scale bars, calibrated lengths, control points."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterable
 from pathlib import Path
 

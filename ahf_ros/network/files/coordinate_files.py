@@ -1,7 +1,5 @@
 """Known coordinates of targets in metres, from what `ahf orient` writes, CSV or JSON."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path

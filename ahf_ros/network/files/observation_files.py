@@ -1,7 +1,5 @@
 """Image points of targets, as `ahf identify --json` prints them or as CSV of other programs."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path

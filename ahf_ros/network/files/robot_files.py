@@ -1,7 +1,5 @@
 """Poses of a robot as a table, and the mounting of cameras as files that ROS reads."""
 
-from __future__ import annotations
-
 import json
 import re
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Error ellipses, names and round numbers in figures of coordinates."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable
 

@@ -1,7 +1,5 @@
 """Figures of a network as SVG: where targets and cameras are, and what is left of image points."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 from html import escape

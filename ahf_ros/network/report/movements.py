@@ -1,7 +1,5 @@
 """Movements of targets between two epochs, as a picture in SVG."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from html import escape

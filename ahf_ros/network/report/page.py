@@ -1,7 +1,5 @@
 """The page of a network: one HTML file that needs nothing else."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """A network as numbers for the view that turns: targets, ellipsoids, photographs, known ones."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What the page of a network and the terminal say of it, as rows of texts."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -3,8 +3,6 @@
 (0, 0) is the lower left corner of the page, x to the right and y upwards.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from ahf_ros.prints.designs import Contour

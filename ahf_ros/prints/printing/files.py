@@ -1,7 +1,5 @@
 """Files of printed sheets: PDF by ReportLab, SVG, and the geometry as JSON."""
 
-from __future__ import annotations
-
 import io
 import json
 import math

@@ -1,7 +1,5 @@
 """Lengths with units, sizes of pages, and sheets of labels."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import dataclass
 

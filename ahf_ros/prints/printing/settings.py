@@ -1,7 +1,5 @@
 """What is printed, and on what."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 
 from ahf_ros.base.settings.parameter import check_parameters, numbers_in, parameter

@@ -3,8 +3,6 @@
 Lengths are in mm.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass

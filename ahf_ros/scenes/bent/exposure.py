@@ -1,7 +1,5 @@
 """What a camera makes of light: blur, vignetting, noise, and the curve of sRGB."""
 
-from __future__ import annotations
-
 import math
 
 import cv2

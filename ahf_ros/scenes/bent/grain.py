@@ -1,7 +1,5 @@
 """Unevenness that is fixed to a sheet: noise that repeats itself after a long way."""
 
-from __future__ import annotations
-
 import numpy as np
 
 _SIDE = 1024  # cells until noise repeats itself; a power of 2

@@ -1,7 +1,5 @@
 """Whether points are inked, from the outlines that printers get."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from itertools import pairwise

@@ -1,7 +1,5 @@
 """The lens of a camera that looks along z, with x to the right and y down."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

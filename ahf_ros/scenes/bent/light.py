@@ -5,8 +5,6 @@ refraction through rough surfaces, EGSR 2007; shadowing and the Fresnel term are
 inexpensive BRDF model for physically-based rendering, Eurographics 1994.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -6,8 +6,6 @@ defocus and motion blur these samples, their mean is a pixel, and then the senso
 is added before the curve of sRGB.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Where sheets and their targets are before the camera; the truth of a picture."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from itertools import pairwise

@@ -1,7 +1,5 @@
 """The settings of pictures of bent sheets."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, field, fields
 from typing import Any

@@ -5,8 +5,6 @@ axis of the cylinder, z away from the camera. With the curvature c, the surface 
 c (x^2 + z^2) = 2 z, which is a plane for c = 0.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

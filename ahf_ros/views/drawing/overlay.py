@@ -4,8 +4,6 @@ Everything has a dark outline, so that it is seen on any ground. The colours mea
 reports and viewers.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field

@@ -3,8 +3,6 @@
 Pictures of them are as large and as good as a number of bytes allows.
 """
 
-from __future__ import annotations
-
 import base64
 import math
 from collections.abc import Sequence

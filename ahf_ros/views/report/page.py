@@ -3,8 +3,6 @@
 What it knows about each image is a row of numbers and texts, ready for JSON.
 """
 
-from __future__ import annotations
-
 import math
 import os
 from collections import Counter
