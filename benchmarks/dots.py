@@ -27,12 +27,7 @@ from benchmarks.speed import in_turns
 from support.pictures.dot_conditions import PER_RADIUS
 from support.pictures.textures import SIZE, lookalikes, textured_image
 
-METHODS = (
-    ('dots', False),
-    ('dots_published', False),
-    ('dots', True),
-    ('dots_published', True),
-)
+METHODS = (('dots', False), ('dots_published', False), ('dots', True), ('dots_published', True))
 """Detectors, without and with AHF."""
 
 WIDTHS = (24, 29, 36, 48, 60, 90)

@@ -18,12 +18,7 @@ from typing import Any
 import numpy as np
 
 from ahf_ros import identify, read_image
-from ahf_ros.network.network import (
-    CameraView,
-    IntArray,
-    Network,
-    Observations,
-)
+from ahf_ros.network.network import CameraView, IntArray, Network, Observations
 from ahf_ros.network.orient import orient
 from ahf_ros.network.resection import FEWEST_POINTS
 from ahf_ros.network.solution import Solution

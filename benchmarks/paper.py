@@ -55,15 +55,8 @@ PAPER: dict[str, dict[str, str]] = {
         'stripe': '0 / 0 / 0',
         'lattice': '100 / 22 / 22 (0.238)',
     },
-    'AHF-AM': {
-        'stripe': '100 / 100 / 100 (0.116)',
-        'lattice': '100 / 78 / 78 (0.137)',
-    },
-    'TI': {
-        'normal': '53 / 62 / 62 (0.378)',
-        'stripe': '0 / 0 / 0',
-        'lattice': '0 / 0 / 0',
-    },
+    'AHF-AM': {'stripe': '100 / 100 / 100 (0.116)', 'lattice': '100 / 78 / 78 (0.137)'},
+    'TI': {'normal': '53 / 62 / 62 (0.378)', 'stripe': '0 / 0 / 0', 'lattice': '0 / 0 / 0'},
     'AHF-TI': {
         'normal': '63 / 68 / 68 (0.263)',
         'stripe': '80 / 83 / 83 (0.247)',
@@ -235,7 +228,7 @@ def markdown(figures: report.Report) -> str:
     lines = [
         f'{figures["images"]} images a light, {figures["width"]} x {figures["height"]} px, seeds '
         f'from {figures["seed"]}, at most {figures["evaluations"]} filters. '
-        + report.machine_text(figures['machine']),
+        + report.machine_text(figures['machine'])
     ]
     ambients = _values(records, 'ambient')
     for ambient in ambients:

@@ -146,10 +146,7 @@ def stream(image: np.ndarray, detector: Any, expected: int) -> tuple[float, floa
 
     with ThreadPoolExecutor(os.cpu_count()) as executor:
         whole, parts = in_turns(
-            (
-                unchanged,
-                lambda: detector(HomomorphicFilter(image).filtered(*values, executor)),
-            ),
+            (unchanged, lambda: detector(HomomorphicFilter(image).filtered(*values, executor))),
             FRAMES,
         )
     return whole, parts

@@ -14,8 +14,7 @@ SQUARE = {name for name in IMAGES if name.startswith(('aruco', 'apriltag', 'auto
 
 @pytest.mark.lasting  # with the newest versions only: the oldest ones read light otherwise
 @pytest.mark.parametrize(
-    'name',
-    [pytest.param(it, marks=needs_square_markers) if it in SQUARE else it for it in IMAGES],
+    'name', [pytest.param(it, marks=needs_square_markers) if it in SQUARE else it for it in IMAGES]
 )
 def test_an_image_takes_as_many_calls_as_recorded(name: str) -> None:
     calls, targets = calls_for(name)

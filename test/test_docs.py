@@ -110,17 +110,9 @@ def test_the_readme_is_short() -> None:
 @pytest.mark.parametrize(
     ('page', 'pattern', 'place'),
     [
-        (
-            'docs/method.md',
-            r'have a prior of e\^-(\d+)',
-            'families.ring.codewords:_UNEXPECTED',
-        ),
+        ('docs/method.md', r'have a prior of e\^-(\d+)', 'families.ring.codewords:_UNEXPECTED'),
         ('docs/method.md', r'which is a margin below (\d+)', 'families.ring.decoding:CLEAR'),
-        (
-            'docs/limits.md',
-            r'At most (\d+)\s+complete',
-            'vision.dot_search:MAXIMUM_OUTLINES',
-        ),
+        ('docs/limits.md', r'At most (\d+)\s+complete', 'vision.dot_search:MAXIMUM_OUTLINES'),
         ('docs/limits.md', r'and (\d+) candidates', 'vision.candidates:MAXIMUM_CANDIDATES'),
         ('docs/limits.md', r'more than (\d+) dots of the other', 'families.gsi.grouping:FEW'),
     ],

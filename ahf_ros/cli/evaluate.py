@@ -17,10 +17,7 @@ from ahf_ros.scenes.evaluation import TOLERANCE, Score, evaluate, table, total
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Give a parser the arguments of the command."""
     parser.add_argument(
-        'truth',
-        type=input_name,
-        metavar='TRUTH.csv',
-        help='Columns image, id, x, y[, confirmed].',
+        'truth', type=input_name, metavar='TRUTH.csv', help='Columns image, id, x, y[, confirmed].'
     )
     parser.add_argument(
         'results',

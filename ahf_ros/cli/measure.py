@@ -15,12 +15,7 @@ from ahf_ros.network.units import decimals
 
 if TYPE_CHECKING:
     from ahf_ros.network.alignment import Alignment
-    from ahf_ros.network.measurement import (
-        Deviation,
-        Distance,
-        LengthTest,
-        PermissibleError,
-    )
+    from ahf_ros.network.measurement import Deviation, Distance, LengthTest, PermissibleError
     from ahf_ros.network.network import FloatArray
     from ahf_ros.network.points import MeasuredPoints
 

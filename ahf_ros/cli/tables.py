@@ -33,10 +33,7 @@ def terminal() -> Console:
 
 
 def print_table(
-    title: str,
-    head: Sequence[str],
-    rows: Iterable[Sequence[str]],
-    console: Console | None = None,
+    title: str, head: Sequence[str], rows: Iterable[Sequence[str]], console: Console | None = None
 ) -> None:
     """Print a table, numbers to the right; of long ones the first rows.
 

@@ -176,12 +176,7 @@ def _unpacked(packed: bytes) -> Any:
     except zlib.error as error:
         raise ValueError(f'data of format zstd cannot be decoded: {error}') from error
     return SimpleNamespace(
-        height=height,
-        width=width,
-        encoding=name,
-        is_bigendian=is_bigendian,
-        step=step,
-        data=data,
+        height=height, width=width, encoding=name, is_bigendian=is_bigendian, step=step, data=data
     )
 
 

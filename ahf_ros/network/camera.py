@@ -103,10 +103,7 @@ def project(
 
 
 def undistort(
-    calibration: FloatArray,
-    xy: FloatArray,
-    backward: bool = False,
-    equidistant: Fisheye = False,
+    calibration: FloatArray, xy: FloatArray, backward: bool = False, equidistant: Fisheye = False
 ) -> FloatArray:
     """Return the places (n, 2) in the plane z = 1 whose images are xy in px, by Newton's method.
 

@@ -264,10 +264,7 @@ def _weighted(
 
 
 def _warnings(
-    variances: VarianceTest,
-    states: Sequence[State],
-    names: Sequence[str],
-    moved: Mask,
+    variances: VarianceTest, states: Sequence[State], names: Sequence[str], moved: Mask
 ) -> list[str]:
     """Return what whoever reads the results must know, as sentences."""
     warnings = []

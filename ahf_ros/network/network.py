@@ -234,11 +234,7 @@ def _check_control(name: str, xyz: FloatArray, covariance: FloatArray) -> None:
 
 
 def _refuse(
-    network: Network,
-    bad: NDArray[np.bool_],
-    field: str,
-    values: FloatArray,
-    expected: str,
+    network: Network, bad: NDArray[np.bool_], field: str, values: FloatArray, expected: str
 ) -> None:
     """Raise `ValueError` that names the first bad observation and how many there are."""
     if not bad.any():

@@ -361,11 +361,7 @@ def changed(
         camera.rotation_matrices(poses[:, 3:]) @ rotations[layout.photographs]
     )
     return replace(
-        state,
-        calibrations=calibrations,
-        rotations=rotations,
-        positions=positions,
-        points=points,
+        state, calibrations=calibrations, rotations=rotations, positions=positions, points=points
     )
 
 

@@ -12,11 +12,7 @@ from ahf_ros.base.text import counted, listed
 from ahf_ros.network.adjustment import adjust
 from ahf_ros.network.calibration import UNDETERMINED
 from ahf_ros.network.datum import Datum
-from ahf_ros.network.lens_model import (
-    fisheye_lenses,
-    unsuitable_lenses,
-    with_fisheye_lenses,
-)
+from ahf_ros.network.lens_model import fisheye_lenses, unsuitable_lenses, with_fisheye_lenses
 from ahf_ros.network.network import FloatArray, IntArray, Network, once_a_photograph
 from ahf_ros.network.planar import principal_axes
 from ahf_ros.network.progress import Watcher, watched

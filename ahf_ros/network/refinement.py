@@ -25,11 +25,7 @@ NEEDED = (
 
 
 def refine(
-    network: Network,
-    start: NetworkState,
-    free: tuple[str, ...] = (),
-    *,
-    rounds: int = 30,
+    network: Network, start: NetworkState, free: tuple[str, ...] = (), *, rounds: int = 30
 ) -> NetworkState:
     """Return approximate values bettered by a robust adjustment of the used observations.
 

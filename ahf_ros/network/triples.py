@@ -270,10 +270,7 @@ def _hypotheses(
 
 
 def _refined(
-    part: Network,
-    start: NetworkState,
-    triple: tuple[int, int, int],
-    unknown: list[int],
+    part: Network, start: NetworkState, triple: tuple[int, int, int], unknown: list[int]
 ) -> Seed | None:
     """Return the seed after a robust adjustment, None where it fails."""
     views = (

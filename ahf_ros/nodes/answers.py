@@ -43,10 +43,7 @@ class _Form(NamedTuple):
 _FORMS = (
     _Form('detections', 'Detection2DArray', DETECTIONS, target_detections),
     _Form(
-        'apriltag_detections',
-        'AprilTagDetectionArray',
-        APRILTAG_DETECTIONS,
-        apriltag_detections,
+        'apriltag_detections', 'AprilTagDetectionArray', APRILTAG_DETECTIONS, apriltag_detections
     ),
 )
 

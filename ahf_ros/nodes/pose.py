@@ -23,12 +23,7 @@ from ahf_ros.msg import CodedTargetArray
 from ahf_ros.network.files.coordinate_files import read_coordinates
 from ahf_ros.network.points import blocks
 from ahf_ros.network.pose import Pose
-from ahf_ros.network.single_image import (
-    NamedPlaces,
-    centre_covariances,
-    known_targets,
-    pose_of,
-)
+from ahf_ros.network.single_image import NamedPlaces, centre_covariances, known_targets, pose_of
 from ahf_ros.nodes.diagnostics import PERIOD, PoseDiagnostics, PoseTally, publish_status
 from ahf_ros.nodes.messages import (
     PosedTarget,
@@ -181,11 +176,7 @@ class PoseNode(ProcessNode):
         return pose
 
     def _publish(
-        self,
-        pose: Pose,
-        targets: tuple[Target, ...],
-        header: Header,
-        settings: PoseNodeSettings,
+        self, pose: Pose, targets: tuple[Target, ...], header: Header, settings: PoseNodeSettings
     ) -> None:
         of_targets = Header(stamp=header.stamp, frame_id=settings.targets_frame)
         self._poses.publish(pose_message(pose.camera, of_targets))

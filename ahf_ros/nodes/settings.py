@@ -109,9 +109,7 @@ class DetectorNodeSettings:
         '', 'Name of the ahf_ros/srv/Identify that the detector service calls.', read_only=True
     )
     allow_programs: bool = parameter(
-        False,
-        'Whether the node may start programs, as the detector command does.',
-        read_only=True,
+        False, 'Whether the node may start programs, as the detector command does.', read_only=True
     )
     managed: bool = parameter(
         False,

@@ -71,10 +71,7 @@ class Watch:
         self._reported: dict[str, float] = {}  # when what was last to be said, s
 
     def look(
-        self,
-        images: Input,
-        expected: Expected,
-        clouds: tuple[Input, Waiting] | None,
+        self, images: Input, expected: Expected, clouds: tuple[Input, Waiting] | None
     ) -> None:
         """Bring the tally up to date.
 

@@ -227,9 +227,7 @@ def test_a_finished_bag_without_its_data_is_not_done(
 
 
 def test_a_bag_that_shrinks_while_it_is_answered_keeps_its_answers(
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    run: Run,
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, run: Run
 ) -> None:
     source = recorded(tmp_path)
     read = Source.messages
@@ -296,11 +294,7 @@ def test_tf_of_old_bags_has_its_name_in_ros2(tmp_path: Path) -> None:
     ],
 )
 def test_rows_of_any_content_are_read_or_named(
-    tmp_path: Path,
-    statement: str,
-    reason: str,
-    copied: int,
-    run: Run,
+    tmp_path: Path, statement: str, reason: str, copied: int, run: Run
 ) -> None:
     source = recorded(tmp_path, 'sqlite3')
     with closing(sqlite3.connect(source / 'in.db3')) as database, database:
@@ -331,10 +325,7 @@ def test_a_file_that_is_none_is_refused(tmp_path: Path, run: Run) -> None:
     ],
 )  # fmt: skip
 def test_metadata_of_any_content_are_named(
-    tmp_path: Path,
-    metadata: str,
-    reason: str,
-    run: Run,
+    tmp_path: Path, metadata: str, reason: str, run: Run
 ) -> None:
     source = recorded(tmp_path)
     (source / 'metadata.yaml').write_text(metadata)

@@ -13,11 +13,7 @@ from ahf_ros.bag.definitions import (
     typestore,
 )
 from ahf_ros.base.target import UNDECODED, FilterState, Identification, Target
-from ahf_ros.files.target_messages import (
-    coded_target_array,
-    identification_from,
-    is_answered,
-)
+from ahf_ros.files.target_messages import coded_target_array, identification_from, is_answered
 
 FOUND = Identification(
     (

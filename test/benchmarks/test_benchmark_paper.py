@@ -37,10 +37,7 @@ def row(text: str, name: str) -> list[str]:
 
 def test_the_figures_of_the_paper_stand_beside_ours(measured: tuple[str, Path]) -> None:
     text, _ = measured
-    assert row(text, 'AHF-TI in the paper') == [
-        '63 / 68 / 68 (0.263)',
-        '80 / 83 / 83 (0.247)',
-    ]
+    assert row(text, 'AHF-TI in the paper') == ['63 / 68 / 68 (0.263)', '80 / 83 / 83 (0.247)']
     for name in ('traditional', 'ring', 'AHF-ring', 'aruco'):
         assert row(text, name)[0].startswith('100 / 100 / 100 (0.0'), name
     plain, driven = (row(text, name)[1] for name in ('traditional', 'AHF-traditional'))

@@ -89,11 +89,7 @@ def test_names_lie_in_modules_functions_and_tuples() -> None:
     assert value_of('vision.ellipses:_INLIER') == '0.06'  # one of two in a line
     assert value_of('families.ring.contests:resolve') == 'a function'
     assert value_of('families.ring.contests:resolve.kept') == 'owners(len(ids), on_it)'
-    for missing in (
-        'vision.ellipses:_NO',
-        'vision.no:_MINIMUM_STEP',
-        'vision.ellipses:no.a',
-    ):
+    for missing in ('vision.ellipses:_NO', 'vision.no:_MINIMUM_STEP', 'vision.ellipses:no.a'):
         with pytest.raises(KeyError):
             value_of(missing)
 

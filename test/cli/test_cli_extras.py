@@ -63,10 +63,7 @@ def folder(tmp_path: Path) -> Path:
 
 @pytest.mark.parametrize('extra', NEEDING)
 def test_a_command_names_the_extra_that_it_needs(
-    extra: str,
-    folder: Path,
-    take_away: Callable[[str], str],
-    capsys: pytest.CaptureFixture[str],
+    extra: str, folder: Path, take_away: Callable[[str], str], capsys: pytest.CaptureFixture[str]
 ) -> None:
     said = take_away(extra)
     words = NEEDING[extra].format(folder=folder).split()

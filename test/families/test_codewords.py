@@ -3,12 +3,7 @@
 import numpy as np
 import pytest
 
-from ahf_ros.families.ring.codewords import (
-    COMPETITORS,
-    best_words,
-    likeliest_bits,
-    prior,
-)
+from ahf_ros.families.ring.codewords import COMPETITORS, best_words, likeliest_bits, prior
 from ahf_ros.families.words import margins
 from ahf_ros.prints.cyclic import rotated_words
 from ahf_ros.prints.ring import canonical, family, sectors

@@ -101,8 +101,7 @@ def test_sectors_that_blur_mixes_are_read(tmp_path: Path, light: str, least: int
 
 @pytest.mark.lasting
 @pytest.mark.parametrize(
-    ('bits', 'band', 'radius'),
-    [(22, (1.8, 2.7), 6.2), (24, (1.41, 2.0), 7.8)],
+    ('bits', 'band', 'radius'), [(22, (1.8, 2.7), 6.2), (24, (1.41, 2.0), 7.8)]
 )
 def test_bright_sectors_and_gaps_little_wider_than_blur_are_read(
     tmp_path: Path, bits: int, band: tuple[float, float], radius: float

@@ -84,10 +84,7 @@ def test_targets_are_identified_and_placed(family: str, changes: dict, bound: fl
 
 @pytest.mark.parametrize(
     ('family', 'changes', 'least', 'bound'),
-    [
-        ('gsi', {'dot_radius': 9.0, 'targets': 2}, 2, 0.05),
-        ('dots', {'dot_radius': 14.0}, 4, 0.1),
-    ],
+    [('gsi', {'dot_radius': 9.0, 'targets': 2}, 2, 0.05), ('dots', {'dot_radius': 14.0}, 4, 0.1)],
 )
 def test_places_come_from_the_image_as_received(
     family: str, changes: dict, least: int, bound: float

@@ -8,12 +8,7 @@ import pytest
 
 from ahf_ros.base.target import UNDECODED, DottedTarget, Identification
 from ahf_ros.families import create_detector
-from ahf_ros.families.gsi.evidence import (
-    Evidence,
-    find_evidence,
-    likely_templates,
-    read_codes,
-)
+from ahf_ros.families.gsi.evidence import Evidence, find_evidence, likely_templates, read_codes
 from ahf_ros.families.gsi.grouping import Templates
 from ahf_ros.prints.gsi import GSI_LIBRARY, point_family, positions_of, value_of
 from ahf_ros.scenes.scene import Rendering

@@ -23,11 +23,7 @@ def peak_of(work: Any) -> int:
 
 
 @pytest.mark.parametrize(
-    ('family', 'bits', 'most'),
-    [
-        ('metashape12', 16, 14.5),
-        ('metashape12,cctag3', 8, 16.0),
-    ],
+    ('family', 'bits', 'most'), [('metashape12', 16, 14.5), ('metashape12,cctag3', 8, 16.0)]
 )
 def test_a_pixel_takes_so_many_bytes(
     family: str, bits: int, most: float, monkeypatch: pytest.MonkeyPatch

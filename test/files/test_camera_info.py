@@ -7,12 +7,7 @@ import numpy as np
 import pytest
 
 from ahf_ros.base.target import Target
-from ahf_ros.files.camera_info import (
-    Calibration,
-    calibration,
-    undistorted,
-    undistorted_targets,
-)
+from ahf_ros.files.camera_info import Calibration, calibration, undistorted, undistorted_targets
 
 OWN = 'camera', 1936, 1296
 K = np.array([[1800.0, 0, 968], [0, 1790, 648], [0, 0, 1]])
@@ -124,17 +119,9 @@ def test_covariances_and_ellipses_follow() -> None:
     [
         ({'k': [0.0] * 9}, OWN, 'k of camera_info has the focal lengths 0 and 0, accepted are'),
         ({'distortion_model': 'brown'}, OWN, "distortion_model is 'brown', accepted is one of pl"),
-        (
-            {'d': [0.1, 0.2]},
-            OWN,
-            'd of camera_info is [0.1, 0.2], accepted are 0 or 4 or 5',
-        ),
+        ({'d': [0.1, 0.2]}, OWN, 'd of camera_info is [0.1, 0.2], accepted are 0 or 4 or 5'),
         ({'d': [np.nan] * 5}, OWN, 'd of camera_info is [nan, nan'),
-        (
-            {},
-            ('other', 1936, 1296),
-            "frame_id of camera_info is 'camera', accepted is that of",
-        ),
+        ({}, ('other', 1936, 1296), "frame_id of camera_info is 'camera', accepted is that of"),
         ({}, ('camera', 968, 1296), 'camera_info is of an image of 1936 x 1296 px, accepted is'),
     ],
 )

@@ -15,12 +15,7 @@ from ahf_ros.cli import main
 from ahf_ros.cli.identify import image_paths
 from ahf_ros.files.exif import read_exif
 from ahf_ros.files.headers import read_header
-from ahf_ros.files.image_files import (
-    decode_bytes,
-    read_image,
-    read_noted_image,
-    write_image,
-)
+from ahf_ros.files.image_files import decode_bytes, read_image, read_noted_image, write_image
 
 GRAY = np.arange(20 * 30, dtype=np.uint16).reshape(20, 30)
 DARK = (GRAY // 4).astype(np.uint8)

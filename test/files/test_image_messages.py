@@ -14,12 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ahf_ros.families import create_detector
-from ahf_ros.files.image_messages import (
-    ENCODINGS,
-    WITH_PLANES,
-    decode_compressed,
-    decode_image,
-)
+from ahf_ros.files.image_messages import ENCODINGS, WITH_PLANES, decode_compressed, decode_image
 from ahf_ros.scenes.scene import SceneSettings, render
 from ahf_ros.vision.image import as_gray, check_image
 from support.hostile import IMAGES, SIDES, Fields, generators, mutated

@@ -35,10 +35,7 @@ def test_truth_in_another_order_with_folders_and_no_confirmed(tmp_path: Path) ->
         ('image,id,x,y\ni/a,1,2,3\nj/a,1,2,3\n', 'line 3: a is in two folders'),
         (f'image,id,x,y\na,{"9" * 400},2,3\n', "line 2: id is '999.*, .* an integer from -1 to"),
         (f'image,id,x,y\na,{"9" * 5000},2,3\n', "line 2: id is '999.*, accepted is an integer"),
-        (
-            'image,id,x,y\na,1,1e308,3\n',
-            "line 2: x is '1e308', accepted is a finite number",
-        ),
+        ('image,id,x,y\na,1,1e308,3\n', "line 2: x is '1e308', accepted is a finite number"),
         (f'image,id,x,y\na,1,{"1" * 200_000},3\n', 'line 2: field larger than field limit'),
         (f'image,id,x,y,{"x" * 200_000}\n', 'line 1: field larger than field limit'),
     ],

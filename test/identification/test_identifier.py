@@ -6,13 +6,7 @@ from unittest.mock import Mock
 import numpy as np
 import pytest
 
-from ahf_ros.base.target import (
-    UNDECODED,
-    Identification,
-    Target,
-    UndecodedTarget,
-    count_codes,
-)
+from ahf_ros.base.target import UNDECODED, Identification, Target, UndecodedTarget, count_codes
 from ahf_ros.identification.filtering.genes import FIRST
 from ahf_ros.identification.filtering.homomorphic import HomomorphicFilter, median_distance
 from ahf_ros.identification.filtering.identifier import Identifier, is_mirrored

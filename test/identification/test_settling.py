@@ -107,9 +107,7 @@ def side_by_side(*families: str) -> np.ndarray:
 
 @pytest.mark.lasting
 @pytest.mark.parametrize('light', ['normal', 'stripe'])
-def test_a_clear_image_settles_its_family_at_once_and_later_ones_cost_less(
-    light: str,
-) -> None:
+def test_a_clear_image_settles_its_family_at_once_and_later_ones_cost_less(light: str) -> None:
     image = render(replace(WALL, light=light)).image
     identifier = create_identifier(threads=1)
     named = create_identifier(family='metashape12', threads=1)
@@ -193,12 +191,7 @@ def test_a_second_family_in_any_image_of_a_batch_is_found(
 @pytest.mark.parametrize('light', ['normal', 'stripe'])
 @pytest.mark.parametrize(
     'family',
-    [
-        'metashape12',
-        pytest.param('apriltag_36h11', marks=needs_square_markers),
-        'dots',
-        'cctag3',
-    ],
+    ['metashape12', pytest.param('apriltag_36h11', marks=needs_square_markers), 'dots', 'cctag3'],
 )
 def test_nothing_is_left_of_targets_that_are_painted_over(family: str, light: str) -> None:
     size = {'width': 700, 'height': 520, 'dot_radius': 24 if family == 'cctag3' else 12}

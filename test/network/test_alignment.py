@@ -6,12 +6,7 @@ from typing import Literal
 import numpy as np
 import pytest
 
-from ahf_ros.network.alignment import (
-    Alignment,
-    best_fit,
-    three_two_one,
-    unaligned,
-)
+from ahf_ros.network.alignment import Alignment, best_fit, three_two_one, unaligned
 from ahf_ros.network.camera import rotation_matrices
 from ahf_ros.network.datum import movements, s_transform
 from ahf_ros.network.points import MeasuredPoints
@@ -94,10 +89,7 @@ def test_a_free_network_is_fitted_with_equal_weights() -> None:
     freed = MeasuredPoints(measured.names, xyz, covariance, unit='mm')
     source = np.random.default_rng(1)
     aim = {name: it + source.normal(0, 0.5, 3) for name, it in nominal(measured).items()}
-    by_covariance, by_equal = (
-        best_fit(freed, aim),
-        best_fit(freed, aim, weights='equal'),
-    )
+    by_covariance, by_equal = (best_fit(freed, aim), best_fit(freed, aim, weights='equal'))
     np.testing.assert_allclose(by_covariance.points.xyz, by_equal.points.xyz, atol=1e-7)
 
 

@@ -315,10 +315,7 @@ def test_browns_model_stands_for_more_coefficients(tmp_path: Path, more: list[fl
         ('distortion_model: omni', "distortion_model is 'omni'"),
         ('distortion_model: equidistant\nD: [1, 2, 3]', 'are 4 numbers: k1, k2, k3, k4'),
         ('D: [1, 2, 3]', r'accepted are 4 or 5 numbers'),
-        (
-            'D: [1, 2, 3, 4, 5, 6, 7, 8]',
-            r'of the rational model, from which k1, k2',
-        ),
+        ('D: [1, 2, 3, 4, 5, 6, 7, 8]', r'of the rational model, from which k1, k2'),
         ('D: [1, 2, 3, 4, 5, 0, 0, 0, 1, 0, 0, 0]', r'of a thin prism, from which k1'),
     ],
 )
@@ -400,12 +397,7 @@ def known_network(results: Path, **known: Any) -> tuple[Network, list[str]]:
 
 
 def test_bars_and_control_are_found_by_id(results: Path, tmp_path: Path) -> None:
-    lines = (
-        'id_1,id_2,length,sigma,role',
-        '003,4,100,0.1,',
-        '4,5,50,0.2,check',
-        '3,9,1,1,check',
-    )
+    lines = ('id_1,id_2,length,sigma,role', '003,4,100,0.1,', '4,5,50,0.2,check', '3,9,1,1,check')
     bars = read_scale_bars(table(tmp_path, *lines))
     control = read_control(table(tmp_path, 'id,x,y,z', '5,1,2,3', '8,1,2,3'), 0.5)
     network, notes = known_network(results, bars=bars, control=control, unit='m')

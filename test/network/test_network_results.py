@@ -108,10 +108,7 @@ def test_the_table_of_points_has_standard_deviations_and_covariances(tmp_path: P
 CHANGES: dict[str, tuple[Callable[[Any], Any], str]] = {
     'no points': (lambda it: it.pop('points'), "has no 'points'.*of this version"),
     'no redundancy': (lambda it: it.pop('redundancy'), "has no 'redundancy'.*of this version"),
-    'NaN': (
-        lambda it: it['points'][1].update(x=float('nan')),
-        'points 2: x is nan',
-    ),
+    'NaN': (lambda it: it['points'][1].update(x=float('nan')), 'points 2: x is nan'),
     'text': (lambda it: it['points'][1].update(x='1'), "points 2: x is '1'.*a number"),
     'twice': (lambda it: it['points'][1].update(id='1'), "points have '1' twice"),
     'fewer': (lambda it: it['points'].pop(), 'ids has the shape'),

@@ -305,10 +305,7 @@ def test_parallel_photographs_do_not_tell_the_focal_length(depth: float) -> None
 
 def without(network: Network, keep: np.ndarray) -> Network:
     observed = network.observations
-    return replace(
-        network,
-        observations=observed.rows(keep),
-    )
+    return replace(network, observations=observed.rows(keep))
 
 
 def test_too_little_is_refused_in_words() -> None:

@@ -11,14 +11,7 @@ from ahf_ros.network.camera import project, rotation_matrices
 from ahf_ros.network.points import MeasuredPoints
 from ahf_ros.network.transform import Transform
 from benchmarks.registration import posed
-from support.poses import (
-    CAMERA,
-    View,
-    error,
-    normalised_square,
-    view,
-    with_wrong_id,
-)
+from support.poses import CAMERA, View, error, normalised_square, view, with_wrong_id
 
 
 def seeded(*numbers: int) -> np.random.Generator:

@@ -80,10 +80,7 @@ def shown(*ids: int, expected: int = 0, listed: tuple[int, ...] = (), **more: An
             [shown(listed=(7, 8), other_ids=(1, 3))],
             'show IDs 1, 3 and none of expected_ids: set expected_ids to those of the targets',
         ),
-        (
-            [shown(listed=(7, 8), other_ids=(1, 3), mirrored=True)],
-            'show no target, N is 2',
-        ),
+        ([shown(listed=(7, 8), other_ids=(1, 3), mirrored=True)], 'show no target, N is 2'),
     ],
 )
 def test_ten_images_in_a_row_without_what_is_expected_are_told(found: list, words: str) -> None:

@@ -76,10 +76,7 @@ def test_a_signal_during_the_imports_ends_in_order(node: str, number: str) -> No
 @pytest.mark.parametrize(
     ('arguments', 'reason'),
     [
-        (
-            ['--params-file', '/nowhere'],
-            "Couldn't parse params file: '--params-file /nowhere'",
-        ),
+        (['--params-file', '/nowhere'], "Couldn't parse params file: '--params-file /nowhere'"),
         (['-r', '__ns:=/bad-name'], "Couldn't parse remap rule: '-r __ns:=/bad-name'"),
         (['-p', 'population'], "Couldn't parse parameter override rule: '-p population'"),
         (['-p', 'qos_overrides./image.subscription.reliability:=foo'], 'foo'),

@@ -17,12 +17,7 @@ from std_msgs.msg import Header
 from std_srvs.srv import Trigger
 from test_nodes import header
 
-from ahf_ros.clouds.point_clouds import (
-    COVARIANCE,
-    TARGET_POINT,
-    target_scan,
-    whole_points,
-)
+from ahf_ros.clouds.point_clouds import COVARIANCE, TARGET_POINT, target_scan, whole_points
 from ahf_ros.clouds.registration.scan import Scan
 from ahf_ros.files.cloud_files import read_cloud
 from ahf_ros.network.camera import rotation_matrices

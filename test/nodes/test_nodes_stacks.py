@@ -60,9 +60,7 @@ def test_a_stack_is_answered_once_with_the_stamp_of_its_last_image(
     assert sent(detector, stream, 2) == [(13, TRUTH), (17, TRUTH)]
 
 
-def test_what_does_not_belong_together_is_answered_and_said(
-    detector: DetectorProcess,
-) -> None:
+def test_what_does_not_belong_together_is_answered_and_said(detector: DetectorProcess) -> None:
     detector.graph.newer(detector.diagnostics)
     before = int(detector.told('stacks that were not full'))
     small = [pixels[:-20] for pixels in PHASES]

@@ -34,10 +34,7 @@ def test_what_is_published_needs_its_packages(monkeypatch: pytest.MonkeyPatch) -
 @pytest.mark.parametrize(
     ('given', 'words'),
     [
-        (
-            {'coordinates': ''},
-            "coordinates is '', accepted is a folder of ahf orient",
-        ),
+        ({'coordinates': ''}, "coordinates is '', accepted is a folder of ahf orient"),
         ({'targets_frame': '/map'}, "targets_frame is '/map', accepted is a name without spaces"),
         ({'targets_frame': 'a b'}, "targets_frame is 'a b', accepted is a name without spaces"),
         ({'tf': 'map'}, "tf is 'map', accepted is one of none, camera, targets"),

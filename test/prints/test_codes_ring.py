@@ -224,10 +224,7 @@ def test_prints_with_other_circles_are_other_prints(tmp_path: Path) -> None:
         ({'codes': {'1': 71}}, 'accepted is a family with either the field words or the field'),
         ({'words': None, 'codes': {'x': 71}}, 'codes.x is 71, accepted is a word whose name is'),
         ({'words': None, 'codes': {}}, 'accepted is a mapping of one ID at least to its word'),
-        (
-            {'words': None, 'codes': {'1': 3, '2': 6}},
-            'codes.2 is 6, accepted is a word that is',
-        ),
+        ({'words': None, 'codes': {'1': 3, '2': 6}}, 'codes.2 is 6, accepted is a word that is'),
         ({'numbers': 'mine'}, "line 5: numbers is 'mine', accepted is rank, or a mapping with"),
         ({'numbers': {'first_bit': 'x'}}, "first_bit is 'x', accepted is lowest or highest"),
         ({'family': ''}, "line 1: family is '', accepted is a text"),

@@ -101,10 +101,7 @@ def _ratio(points: FloatArray, aim: FloatArray) -> float:
 
 def _of_scale(ratio: float) -> str:
     words = f'targets are {1 / ratio:.4g} times as far apart in the scan as in the field'
-    for factor, scan, other in (
-        (1e-3, 'millimetres', 'metres'),
-        (1e3, 'metres', 'millimetres'),
-    ):
+    for factor, scan, other in ((1e-3, 'millimetres', 'metres'), (1e3, 'metres', 'millimetres')):
         if abs(np.log(ratio / factor)) < np.log(_OTHER_SCALE):
             return f'{words}: the scan is in {scan}, the field in {other}; accepted are metres'
     return f'{words}, accepted is the same scale'

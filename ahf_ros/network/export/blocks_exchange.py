@@ -13,12 +13,7 @@ from xml.etree.ElementTree import Element, SubElement
 
 import numpy as np
 
-from ahf_ros.network.export.adjusted import (
-    by_target,
-    file_name,
-    lens_of,
-    oriented,
-)
+from ahf_ros.network.export.adjusted import by_target, file_name, lens_of, oriented
 from ahf_ros.network.export.xml_files import serialised
 from ahf_ros.network.solution import Solution
 

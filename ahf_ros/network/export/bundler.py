@@ -17,14 +17,7 @@ import numpy as np
 
 from ahf_ros.files.files import csv_table
 from ahf_ros.network.camera import undistort
-from ahf_ros.network.export.adjusted import (
-    Seen,
-    by_target,
-    file_name,
-    lens_of,
-    numbers,
-    oriented,
-)
+from ahf_ros.network.export.adjusted import Seen, by_target, file_name, lens_of, numbers, oriented
 from ahf_ros.network.network import FloatArray
 from ahf_ros.network.solution import Solution
 

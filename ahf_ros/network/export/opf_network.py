@@ -68,10 +68,7 @@ def opf_network_files(solution: Solution) -> dict[str, bytes]:
 
 def _camera_list(solution: Solution) -> list[dict[str, Any]]:
     return [
-        {
-            'id': number + 1,
-            'uri': Path(solution.network.photographs[number]).absolute().as_uri(),
-        }
+        {'id': number + 1, 'uri': Path(solution.network.photographs[number]).absolute().as_uri()}
         for number in oriented(solution)
     ]
 

@@ -31,10 +31,7 @@ NETWORK_FILE = 'network.json'
 POINTS_FILE = 'points.csv'
 COVARIANCE_FILE = 'covariance_of_points.npz'
 
-DISTORTION = (
-    ('k1', 'k2', 'k3', 'p1', 'p2', 'shear'),
-    ('k1', 'k2', 'k3', 'k4', 'shear'),
-)
+DISTORTION = (('k1', 'k2', 'k3', 'p1', 'p2', 'shear'), ('k1', 'k2', 'k3', 'k4', 'shear'))
 """Parameters of lenses in network.json, Brown's and equidistant; affinity is that of fx to fy."""
 
 

@@ -17,11 +17,7 @@ from ahf_ros.files.target_json import json_lines
 from ahf_ros.network.export.survey import MAXIMUM_SIDE, measured_image
 from ahf_ros.network.network import FloatArray
 
-_PRECISIONS = (
-    ('sigma',),
-    ('sigma_x', 'sigma_y'),
-    ('variance_x', 'covariance_xy', 'variance_y'),
-)
+_PRECISIONS = (('sigma',), ('sigma_x', 'sigma_y'), ('variance_x', 'covariance_xy', 'variance_y'))
 """Columns of a table that say how precise its image points are; one of these groups."""
 
 _SIZE = 'width', 'height'
