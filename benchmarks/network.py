@@ -26,11 +26,7 @@ SIZES = (125, 250, 500, 1000)
 
 def scale_table(seeds: Sequence[int]) -> list[str]:
     """Return times of 200 targets, 80 in a photograph, as lines of Markdown."""
-    lines = [
-        '| photographs | observations | parameters given, no tests, s | all and tests, s '
-        '| memory MB |',
-        '|---|---|---|---|---|',
-    ]
+    rows = []
     for photographs in SIZES:
         random = np.random.default_rng([seeds[0], photographs])
         network, truth = simulate(Field(photographs, 200, each=80), random)
@@ -41,11 +37,10 @@ def scale_table(seeds: Sequence[int]) -> list[str]:
         adjust(network, start)
         end = time.perf_counter()
         memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
-        lines.append(
-            f'| {photographs} | {len(network.observations.xy)} | {between - begin:.1f} '
-            f'| {end - between:.1f} | {memory:.0f} |'
-        )
-    return lines
+        times = f'{between - begin:.1f}', f'{end - between:.1f}'
+        rows.append((photographs, len(network.observations.xy), *times, f'{memory:.0f}'))
+    times = 'parameters given, no tests, s', 'all and tests, s'
+    return markdown(('photographs', 'observations', *times, 'memory MB'), rows)
 
 
 def from_ids(seeds: Sequence[int]) -> list[str]:
@@ -73,21 +68,18 @@ def camcal_table() -> list[str]:
     solution = camcal.solve(path)
     values, deviations = camcal.in_dbat_units(solution)
     theirs, their_deviations = camcal.dbat(path)
-    lines = [
-        f'sigma0 {solution.sigma0 / 10:.5f} px, redundancy {solution.redundancy}',
-        '',
-        '| parameter (mm) | here | DBAT | difference, sigma | sigma here | sigma DBAT | ratio |',
-        '|---|---|---|---|---|---|---|',
-    ]
     names = ('cc', 'px', 'py', 'as', 'K1', 'K2', 'K3', 'P1', 'P2')
-    lines += [
-        f'| {name} | {mine:.8g} | {other:.8g} | {(mine - other) / size:+.3f} | {deviation:.3g} '
-        f'| {size:.3g} | {deviation / size:.3f} |'
-        for name, mine, other, deviation, size in zip(
-            names, values, theirs, deviations, their_deviations, strict=True
+    columns = zip(names, values, theirs, deviations, their_deviations, strict=True)
+    rows = [
+        (
+            *(name, f'{mine:.8g}', f'{other:.8g}', f'{(mine - other) / size:+.3f}'),
+            *(f'{deviation:.3g}', f'{size:.3g}', f'{deviation / size:.3f}'),
         )
+        for name, mine, other, deviation, size in columns
     ]
-    return lines
+    differences = 'difference, sigma', 'sigma here', 'sigma DBAT', 'ratio'
+    about = f'sigma0 {solution.sigma0 / 10:.5f} px, redundancy {solution.redundancy}'
+    return [about, '', *markdown(('parameter (mm)', 'here', 'DBAT', *differences), rows)]
 
 
 TABLES: dict[str, Callable[[int, int | None], list[str]]] = {

@@ -61,10 +61,7 @@ def ellipsoids_table(seeds: Sequence[int], runs: int = 125) -> list[str]:
     The truth is brought into the datum of the solution, inner constraints on all points, by the
     similarity of least squares.
     """
-    lines = [
-        '| field | photographs | runs | parameters given % | all, usual lenses % | sigma0 |',
-        '|---|---|---|---|---|---|',
-    ]
+    rows = []
     for planar in (True, False):
         for photographs in SIZES:
             field = Field(photographs, targets=25, planar=planar)
@@ -79,12 +76,12 @@ def ellipsoids_table(seeds: Sequence[int], runs: int = 125) -> list[str]:
                 sigma0.append(given.sigma0)
                 if run < runs // 5:
                     held[1].append(coverage(adjust(network, start), truth))
+            shares = [f'{100 * np.mean(it):.1f}' for it in held]
+            shares[1] += f' ({len(held[1])} runs)'
             name = 'planar' if planar else '3-D'
-            lines.append(
-                f'| {name} | {photographs} | {runs} | {100 * np.mean(held[0]):.1f} '
-                f'| {100 * np.mean(held[1]):.1f} ({len(held[1])} runs) | {np.mean(sigma0):.3f} |'
-            )
-    return lines
+            rows.append((name, photographs, runs, *shares, f'{np.mean(sigma0):.3f}'))
+    shares = ['parameters given %', 'all, usual lenses %']
+    return markdown(('field', 'photographs', 'runs', *shares, 'sigma0'), rows)
 
 
 def coverage(solution: Solution, truth: NetworkState) -> float:
@@ -100,11 +97,7 @@ def coverage(solution: Solution, truth: NetworkState) -> float:
 
 def outliers_table(seeds: Sequence[int], runs: int = 25) -> list[str]:
     """Return what is accepted and kept, as lines of Markdown."""
-    lines = [
-        '| field | photographs | runs | wrong | accepted above 5 sigma | good | kept % '
-        '| moved target named |',
-        '|---|---|---|---|---|---|---|---|',
-    ]
+    rows = []
     for planar in (True, False):
         for photographs in SIZES:
             sums = np.zeros(5, dtype=int)
@@ -112,11 +105,10 @@ def outliers_table(seeds: Sequence[int], runs: int = 25) -> list[str]:
                 random = np.random.default_rng([seeds[0], photographs, planar, run])
                 sums += counted(Field(photographs, 40, planar, each=30), random)
             wrong, accepted, good, kept, named = sums
-            lines.append(
-                f'| {"planar" if planar else "3-D"} | {photographs} | {runs} | {wrong} '
-                f'| {accepted} | {good} | {100 * kept / good:.2f} | {named} |'
-            )
-    return lines
+            start = 'planar' if planar else '3-D', photographs, runs
+            rows.append((*start, wrong, accepted, good, f'{100 * kept / good:.2f}', named))
+    counts = 'wrong', 'accepted above 5 sigma', 'good', 'kept %', 'moved target named'
+    return markdown(('field', 'photographs', 'runs', *counts), rows)
 
 
 def counted(field: Field, random: np.random.Generator) -> tuple[int, int, int, int, bool]:

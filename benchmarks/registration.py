@@ -20,7 +20,7 @@ from ahf_ros.network.network import FloatArray
 from ahf_ros.network.pose import Pose
 from ahf_ros.network.single_image import resect
 from ahf_ros.network.transform import Transform
-from benchmarks.report import print_chosen
+from benchmarks.report import print_chosen, table
 from support.poses import CAMERA, View, normalised_square, view, with_wrong_id
 from support.scans import clouds, drawn, ring, squared_error, station
 
@@ -89,23 +89,25 @@ def _count(counts: Counts, of: View, pose: Pose) -> None:
 
 def pose_table(seed: int, runs: int) -> list[str]:
     """Return the figures of each field as lines of Markdown."""
-    lines = [
-        '| field | images | NEES of 6 | refused | marked as ambiguous | beyond 10 sigma '
-        '| wrong IDs named | largest shift by them, sigma | good left out '
-        '| processor time, ms: mean, most |',
-        '|---' * 10 + '|',
-    ]
+    rows = []
     warm = view(1.0, 0.0, np.random.default_rng(seed))
     resect(warm.targets, warm.points, CAMERA)
     for name, (width, depth) in FIELDS.items():
         of = posed(width, depth, seed, runs)
         of.seconds.sort()
-        lines.append(
-            f'| {name} | {runs} | {np.mean(of.squares):.2f} | {of.refused} | {of.ambiguous} '
-            f'| {of.flipped} | {of.named} of {of.wrong} | {of.moved:.1e} | {of.good_rejected} '
-            f'| {1e3 * np.mean(of.seconds):.1f}, {1e3 * of.seconds[-1]:.1f} |'
+        rows.append(
+            (
+                *(name, runs, f'{np.mean(of.squares):.2f}', of.refused, of.ambiguous, of.flipped),
+                *(f'{of.named} of {of.wrong}', f'{of.moved:.1e}', of.good_rejected),
+                f'{1e3 * np.mean(of.seconds):.1f}, {1e3 * of.seconds[-1]:.1f}',
+            )
         )
-    return lines
+    head = (
+        *('field', 'images', 'NEES of 6', 'refused', 'marked as ambiguous', 'beyond 10 sigma'),
+        *('wrong IDs named', 'largest shift by them, sigma', 'good left out'),
+        'processor time, ms: mean, most',
+    )
+    return table(head, rows)
 
 
 COUNT = 20

@@ -132,17 +132,17 @@ def once_a_photograph(network: Network) -> Network:
 def without(network: Network, rows: NDArray[np.bool_], reason: str) -> Network:
     """Return the network whose marked observations (m,) are set aside, for a reason."""
     observed = network.observations
-    aside = tuple(
-        Rejection(
-            network.photographs[observed.photograph[row]],
-            network.targets[observed.point[row]],
-            (float(observed.xy[row, 0]), float(observed.xy[row, 1])),
-            reason,
-        )
-        for row in np.flatnonzero(rows)
-    )
+    aside = tuple(rejected(network, int(row), reason) for row in np.flatnonzero(rows))
     kept = observed.rows(~rows)
     return replace(network, observations=kept, set_aside=network.set_aside + aside)
+
+
+def rejected(network: Network, row: int, reason: str, length: float | None = None) -> Rejection:
+    """Return that an observation is not used, and why; its residual has a normalised length."""
+    observed = network.observations
+    x, y = map(float, observed.xy[row])
+    photograph = network.photographs[observed.photograph[row]]
+    return Rejection(photograph, network.targets[observed.point[row]], (x, y), reason, length)
 
 
 def part_of(

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from ahf_ros.network import camera, normals
 from ahf_ros.network.least_squares import Knowledge, minimise, normal_equations
-from ahf_ros.network.network import FloatArray, Network, Rejection
+from ahf_ros.network.network import FloatArray, Network, Rejection, rejected
 from ahf_ros.network.normals import Layout
 from ahf_ros.network.precision import Precision, of_computed, precision
 from ahf_ros.network.progress import stage
@@ -253,20 +253,13 @@ def rejections(
         other = _other_target(every, state, int(row), critical)
         if other is not None:
             reasons[int(row)] = f'wrong ID: the place of target {network.targets[other]}'
-    rejected = [
-        _rejection(
-            network,
-            int(every.observations[row]),
-            reasons.get(int(row), 'does not fit the other photographs'),
-            float(result.lengths[row]),
-        )
-        for row in off
+    usual, few = 'does not fit the other photographs', 'in fewer than two photographs that agree'
+    left_out = [
+        rejected(network, int(observation), reasons.get(row, usual), float(result.lengths[row]))
+        for row, observation in zip(off.tolist(), every.observations[off], strict=True)
     ]
-    rejected += [
-        _rejection(network, int(place), 'in fewer than two photographs that agree', None)
-        for place in _unchecked(network, result)
-    ]
-    return tuple(rejected), tuple(warnings)
+    left_out += [rejected(network, int(place), few) for place in _unchecked(network, result)]
+    return tuple(left_out), tuple(warnings)
 
 
 def _by_chance(every: Layout, state: NetworkState, place: Place, rows: NDArray[np.int64]) -> float:
@@ -302,15 +295,3 @@ def _unchecked(network: Network, result: Adjusted) -> NDArray[np.int64]:
     observations = network.observations
     inside = np.isin(observations.photograph, result.every.photographs)
     return np.flatnonzero(inside & ~np.isin(observations.point, result.every.points))
-
-
-def _rejection(network: Network, observation: int, reason: str, length: float | None) -> Rejection:
-    observations = network.observations
-    x, y = observations.xy[observation]
-    return Rejection(
-        network.photographs[observations.photograph[observation]],
-        network.targets[observations.point[observation]],
-        (float(x), float(y)),
-        reason,
-        length,
-    )
