@@ -16,10 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ahf_ros.network import camera, normals
-from ahf_ros.network.least_squares import Knowledge, minimise, normal_equations
+from ahf_ros.network.least_squares import Knowledge, Precision, minimise, of_computed, precision
 from ahf_ros.network.network import FloatArray, Network, Rejection, rejected
 from ahf_ros.network.normals import Layout
-from ahf_ros.network.precision import Precision, of_computed, precision
 from ahf_ros.network.progress import stage
 from ahf_ros.network.solution import NetworkState
 from ahf_ros.network.testing import (
@@ -158,8 +157,7 @@ def adjusted(
     layout = lay_out(state)
     knowledge = known(layout)
     state, converged = minimise(layout, state, knowledge)
-    reduced, border = normal_equations(layout, state, knowledge)
-    covariances = precision(reduced, border)
+    covariances = precision(layout, state, knowledge)
     every = normals.extended(network, layout)
     used = np.isin(every.observations, layout.observations)
     design = normals.linearise(every, state)

@@ -11,11 +11,10 @@ import numpy as np
 
 from ahf_ros.network import normals
 from ahf_ros.network.camera import known_calibration, pinhole
-from ahf_ros.network.least_squares import normal_equations
+from ahf_ros.network.least_squares import precision
 from ahf_ros.network.network import CameraView, FloatArray, IntArray, Network, part_of
 from ahf_ros.network.normals import BEHIND
 from ahf_ros.network.planar import mirrored
-from ahf_ros.network.precision import precision
 from ahf_ros.network.refinement import free_parameters, refine, usual_lens
 from ahf_ros.network.relative import relative_orientations
 from ahf_ros.network.resection import resections
@@ -366,7 +365,7 @@ def focal_sigma(network: Network, start: NetworkState, free: tuple[str, ...]) ->
         return 0.0 if len(layout.xy) else np.inf
 
     try:
-        covariance = precision(*normal_equations(layout, start, usual_lens(network, layout))).rest
+        covariance = precision(layout, start, usual_lens(network, layout)).rest
     except np.linalg.LinAlgError:
         return np.inf
     variance = covariance[focal, focal]
