@@ -1,4 +1,4 @@
-"""Names of files, and tables in CSV in which a spreadsheet computes nothing."""
+"""Names of files, lines, and tables in CSV in which a spreadsheet computes nothing."""
 
 import csv
 import io
@@ -20,6 +20,11 @@ def checked_file_name(value: Any, name: str) -> str:
     if not isinstance(value, str) or not PurePath(value).name:
         raise ValueError(f'{name} is {shown(value)}, accepted is the name of a file')
     return PurePath(value).name
+
+
+def text_of(lines: Iterable[str]) -> bytes:
+    """Return the file of some lines in UTF-8."""
+    return ''.join(f'{line}\n' for line in lines).encode()
 
 
 def csv_table(rows: Iterable[Sequence[object]]) -> bytes:

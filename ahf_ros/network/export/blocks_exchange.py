@@ -14,7 +14,7 @@ from xml.etree.ElementTree import Element, SubElement
 import numpy as np
 
 from ahf_ros.network.export.adjusted import by_target, file_name, lens_of, oriented
-from ahf_ros.network.export.xml_files import serialised
+from ahf_ros.network.export.xml_files import add_texts, serialised
 from ahf_ros.network.solution import Solution
 
 _VERSION = '2.1'
@@ -24,18 +24,18 @@ def blocks_exchange_files(solution: Solution) -> dict[str, bytes]:
     """Return one block: cameras and poses, and targets as control points with their precision."""
     root = Element('BlocksExchange', version=_VERSION)
     block = SubElement(root, 'Block')
-    _texts(block, {'Name': 'ahf', 'Description': 'Coded targets, oriented by ahf_ros'})
+    add_texts(block, {'Name': 'ahf', 'Description': 'Coded targets, oriented by ahf_ros'})
     groups = SubElement(block, 'Photogroups')
     for camera in np.flatnonzero(solution.calibrated).tolist():
         _photogroup(SubElement(groups, 'Photogroup'), solution, camera)
     points = SubElement(block, 'ControlPoints')
     for target, seen in by_target(solution).items():
         point = SubElement(points, 'ControlPoint')
-        _texts(point, {'Name': solution.network.targets[target], 'Category': 'Full'})
+        add_texts(point, {'Name': solution.network.targets[target], 'Category': 'Full'})
         _place(SubElement(point, 'Position'), solution.state.points[target])
         variances = np.diagonal(solution.point_covariances[target])
         horizontal = float(np.sqrt(variances[:2].mean()))
-        _texts(
+        add_texts(
             point,
             {
                 'HorizontalAccuracy': f'{horizontal:.9g}',
@@ -44,7 +44,7 @@ def blocks_exchange_files(solution: Solution) -> dict[str, bytes]:
         )
         for it in seen:
             measurement = SubElement(point, 'Measurement')
-            _texts(measurement, {'PhotoId': str(it.photograph)})
+            add_texts(measurement, {'PhotoId': str(it.photograph)})
             _place(measurement, it.xy)
     return {'blocks_exchange.xml': serialised(root)}
 
@@ -53,8 +53,8 @@ def _photogroup(group: Element, solution: Solution, camera: int) -> None:
     view, lens = solution.network.cameras[camera], lens_of(solution, camera)
     SubElement(group, 'Name').text = view.name
     size = SubElement(group, 'ImageDimensions')
-    _texts(size, {'Width': str(view.width), 'Height': str(view.height)})
-    _texts(
+    add_texts(size, {'Width': str(view.width), 'Height': str(view.height)})
+    add_texts(
         group,
         {
             'CameraModelType': 'Perspective',
@@ -68,14 +68,16 @@ def _photogroup(group: Element, solution: Solution, camera: int) -> None:
     _place(SubElement(group, 'PrincipalPoint'), np.array([lens.cx, lens.cy]))
     distortion = {'K1': lens.k1, 'K2': lens.k2, 'K3': lens.k3, 'P1': lens.p2, 'P2': lens.p1}
     terms = SubElement(group, 'Distortion')
-    _texts(terms, {name: f'{value:.15g}' for name, value in distortion.items()})
+    add_texts(terms, {name: f'{value:.15g}' for name, value in distortion.items()})
     for number in oriented(solution):
         if solution.network.camera_of[number] == camera:
             _photo(SubElement(group, 'Photo'), solution, number)
 
 
 def _photo(photo: Element, solution: Solution, number: int) -> None:
-    _texts(photo, {'Id': str(number), 'ImagePath': file_name(solution, number), 'Component': '1'})
+    add_texts(
+        photo, {'Id': str(number), 'ImagePath': file_name(solution, number), 'Component': '1'}
+    )
     pose = SubElement(photo, 'Pose')
     rotation = SubElement(pose, 'Rotation')
     for (row, column), value in np.ndenumerate(solution.state.rotations[number]):
@@ -84,9 +86,4 @@ def _photo(photo: Element, solution: Solution, number: int) -> None:
 
 
 def _place(parent: Element, values: np.ndarray) -> None:
-    _texts(parent, {axis: f'{value:.15g}' for axis, value in zip('xyz', values, strict=False)})
-
-
-def _texts(parent: Element, texts: dict[str, str]) -> None:
-    for tag, text in texts.items():
-        SubElement(parent, tag).text = text
+    add_texts(parent, {axis: f'{value:.15g}' for axis, value in zip('xyz', values, strict=False)})

@@ -15,7 +15,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ahf_ros.files.files import csv_table
+from ahf_ros.files.files import csv_table, text_of
 from ahf_ros.network.camera import undistort
 from ahf_ros.network.export.adjusted import Seen, by_target, file_name, lens_of, numbers, oriented
 from ahf_ros.network.network import FloatArray
@@ -53,8 +53,8 @@ def bundler_files(solution: Solution) -> dict[str, bytes]:
         lines += [numbers(start.points[target]), _COLOUR, ' '.join([str(len(views)), *views])]
     labels = [(row, network.targets[target]) for row, target in enumerate(tracks)]
     return {
-        'bundle.out': _text(lines),
-        'list.txt': _text(names),
+        'bundle.out': text_of(lines),
+        'list.txt': text_of(names),
         'bundle_labels.csv': csv_table([('point', 'id'), *labels]),
     }
 
@@ -65,7 +65,3 @@ def _ideal(solution: Solution, seen: Sequence[Seen]) -> FloatArray:
     calibrations = solution.state.calibrations[cameras]
     places = undistort(calibrations, np.array([it.xy for it in seen]).reshape(-1, 2))
     return np.asarray(calibrations[:, :1] * places * (1, -1))
-
-
-def _text(lines: list[str]) -> bytes:
-    return ''.join(f'{line}\n' for line in lines).encode()

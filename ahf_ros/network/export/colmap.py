@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from ahf_ros.base.opening import file_errors
-from ahf_ros.files.files import csv_table
+from ahf_ros.files.files import csv_table, text_of
 from ahf_ros.network.export.adjusted import lens_of, numbers
 from ahf_ros.network.export.survey import Survey
 from ahf_ros.network.solution import Solution
@@ -136,15 +136,11 @@ def colmap_model_files(solution: Solution) -> dict[str, bytes]:
         if solution.determined[index]
     ]
     return {
-        'cameras.txt': _text(_cameras(solution)),
-        'images.txt': _text(_images(solution, points_of)),
-        'points3D.txt': _text(_points(solution, points_of)),
+        'cameras.txt': text_of(_cameras(solution)),
+        'images.txt': text_of(_images(solution, points_of)),
+        'points3D.txt': text_of(_points(solution, points_of)),
         'point_labels.csv': csv_table([('point3D_id', 'id'), *labels]),
     }
-
-
-def _text(lines: list[str]) -> bytes:
-    return ''.join(f'{line}\n' for line in lines).encode()
 
 
 def _points_of_images(solution: Solution) -> list[list[int]]:

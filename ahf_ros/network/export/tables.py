@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from ahf_ros.files.files import csv_table
+from ahf_ros.files.files import csv_table, text_of
 from ahf_ros.network.export.survey import Mark, Survey
 
 
@@ -51,7 +51,7 @@ def odm_files(survey: Survey) -> dict[str, bytes]:
             if mark.label in survey.control:
                 point = [repr(float(value)) for value in survey.control[mark.label]]
                 lines.append(' '.join([*point, *_place(mark), photograph.name, mark.label]))
-    return {'gcp_list.txt': ''.join(f'{line}\n' for line in lines).encode()}
+    return {'gcp_list.txt': text_of(lines)}
 
 
 def realitycapture_files(survey: Survey) -> dict[str, bytes]:

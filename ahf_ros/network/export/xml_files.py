@@ -6,6 +6,7 @@ before the distortion, which makes a difference of their product.
 """
 
 import xml.etree.ElementTree as ElementTree
+from collections.abc import Sequence
 from pathlib import Path, PurePath
 from xml.etree.ElementTree import Element, SubElement
 
@@ -13,8 +14,9 @@ import numpy as np
 
 from ahf_ros.network.camera import PARAMETERS, parameters_of
 from ahf_ros.network.export import metashape_console
+from ahf_ros.network.export.adjusted import determined, numbers, oriented
 from ahf_ros.network.export.survey import Survey
-from ahf_ros.network.network import CameraView, FloatArray
+from ahf_ros.network.network import CameraView
 from ahf_ros.network.solution import Solution
 
 NAME = 'ahf'
@@ -30,19 +32,11 @@ def metashape_files(survey: Survey) -> dict[str, bytes]:
 
     Images of one size get one sensor; Metashape takes the cameras of its project by their labels.
     """
-    document = Element('document', version='1.2.0')
-    chunk = SubElement(document, 'chunk')
-    sensors, cameras = SubElement(chunk, 'sensors'), SubElement(chunk, 'cameras')
-    points = SubElement(chunk, 'markers')
-    frame = SubElement(SubElement(chunk, 'frames'), 'frame', id='0')
-    measured = SubElement(frame, 'markers')
+    document, sensors, cameras, points, measured = _metashape_document()
     elements = {}
     for index, label in enumerate(survey.labels):
-        marker = SubElement(points, 'marker', id=str(index), label=label)
-        elements[label] = SubElement(measured, 'marker', marker_id=str(index))
-        if label in survey.control:
-            x, y, z = (repr(float(value)) for value in survey.control[label])
-            SubElement(marker, 'reference', x=x, y=y, z=z, enabled='true')
+        place = [repr(float(value)) for value in survey.control.get(label, ())]
+        elements[label] = _metashape_marker(points, measured, index, label, place)
     sizes: dict[tuple[int, int], str] = {}
     for index, photograph in enumerate(survey.photographs):
         size = width, height = photograph.width, photograph.height
@@ -59,6 +53,26 @@ def metashape_files(survey: Survey) -> dict[str, bytes]:
             SubElement(elements[mark.label], 'location', found)
     script = Path(metashape_console.__file__)
     return {'markers.xml': serialised(document), script.name: script.read_bytes()}
+
+
+def _metashape_document() -> tuple[Element, Element, Element, Element, Element]:
+    """Return a document, its sensors, cameras and markers, and the places of these in images."""
+    document = Element('document', version='1.2.0')
+    chunk = SubElement(document, 'chunk')
+    sensors, cameras, markers = (SubElement(chunk, it) for it in ('sensors', 'cameras', 'markers'))
+    frame = SubElement(SubElement(chunk, 'frames'), 'frame', id='0')
+    return document, sensors, cameras, markers, SubElement(frame, 'markers')
+
+
+def _metashape_marker(
+    markers: Element, measured: Element, index: int, label: str, place: Sequence[str]
+) -> Element:
+    """Add a marker with its coordinates, if it has some; return what takes its image points."""
+    marker = SubElement(markers, 'marker', id=str(index), label=label)
+    if place:
+        reference = dict(zip('xyz', place, strict=True))
+        SubElement(marker, 'reference', {**reference, 'enabled': 'true'})
+    return SubElement(measured, 'marker', marker_id=str(index))
 
 
 def mmvii_files(survey: Survey) -> dict[str, bytes]:
@@ -100,22 +114,23 @@ def mmvii_files(survey: Survey) -> dict[str, bytes]:
 
 def _measures(tag: str, name: dict[str, str], measures: list[dict[str, str]]) -> bytes:
     content = Element(tag)
-    _add_texts(content, name)
+    add_texts(content, name)
     items = SubElement(content, 'Measures')
     for measure in measures:
-        _add_texts(SubElement(items, 'el'), measure)
+        add_texts(SubElement(items, 'el'), measure)
     return mmvii_file(content)
 
 
 def mmvii_file(content: Element) -> bytes:
     """Return a document of MMVII's serialisation."""
     root = Element('Root')
-    _add_texts(root, {'Type': '"MMVII_Serialization"', 'Version': '"0.0.0"'})
+    add_texts(root, {'Type': '"MMVII_Serialization"', 'Version': '"0.0.0"'})
     SubElement(root, 'Data').append(content)
     return serialised(root)
 
 
-def _add_texts(parent: Element, texts: dict[str, str]) -> None:
+def add_texts(parent: Element, texts: dict[str, str]) -> None:
+    """Give an element an element for each tag, with a text."""
     for tag, text in texts.items():
         SubElement(parent, tag).text = text
 
@@ -131,20 +146,17 @@ def metashape_network_files(solution: Solution) -> dict[str, bytes]:
 
     The reference of markers are the adjusted coordinates; axes of cameras are ours.
     """
-    document = Element('document', version='1.2.0')
-    chunk = SubElement(document, 'chunk')
-    _metashape_cameras(chunk, solution)
-    _metashape_markers(chunk, solution)
+    document, sensors, cameras, markers, measured = _metashape_document()
+    _metashape_cameras(sensors, cameras, solution)
+    _metashape_markers(markers, measured, solution)
     files = {'cameras.xml': serialised(document)}
     network = solution.network
     for index, view in enumerate(network.cameras):
         if solution.calibrated[index]:
             root = Element('calibration')
-            SubElement(root, 'projection').text = _metashape_type(view)
-            SubElement(root, 'width').text = str(view.width)
-            SubElement(root, 'height').text = str(view.height)
-            for name, value in _metashape_lens(solution, index).items():
-                SubElement(root, name).text = f'{value:.15g}'
+            size = {'width': str(view.width), 'height': str(view.height)}
+            add_texts(root, {'projection': _metashape_type(view), **size})
+            add_texts(root, _metashape_lens(solution, index))
             stem = 'camera' if len(network.cameras) == 1 else f'camera_{index + 1}'
             files[f'{stem}.xml'] = serialised(root)
     return files
@@ -155,7 +167,7 @@ def _metashape_type(view: CameraView) -> str:
     return 'fisheye' if view.equidistant else 'frame'
 
 
-def _metashape_lens(solution: Solution, index: int) -> dict[str, float]:
+def _metashape_lens(solution: Solution, index: int) -> dict[str, str]:
     """Return a calibration with the principal point from the middle of the image, px."""
     view = solution.network.cameras[index]
     value = dict(
@@ -163,7 +175,7 @@ def _metashape_lens(solution: Solution, index: int) -> dict[str, float]:
     )
     f = value['f']
     beside = {'k4': value['k4']} if view.equidistant else {'p1': value['p2'], 'p2': value['p1']}
-    return {
+    found = {
         'f': f,
         'cx': value['cx'] + _SHIFT - view.width / 2,
         'cy': value['cy'] + _SHIFT - view.height / 2,
@@ -174,11 +186,11 @@ def _metashape_lens(solution: Solution, index: int) -> dict[str, float]:
         'k3': value['k3'],
         **beside,
     }
+    return {name: f'{it:.15g}' for name, it in found.items()}
 
 
-def _metashape_cameras(chunk: Element, solution: Solution) -> None:
+def _metashape_cameras(sensors: Element, cameras: Element, solution: Solution) -> None:
     network, values = solution.network, solution.state
-    sensors, cameras = SubElement(chunk, 'sensors'), SubElement(chunk, 'cameras')
     for index, view in enumerate(network.cameras):
         if not solution.calibrated[index]:
             continue
@@ -189,9 +201,8 @@ def _metashape_cameras(chunk: Element, solution: Solution) -> None:
         SubElement(sensor, 'resolution', size)
         lens = SubElement(sensor, 'calibration', {'type': kind, 'class': 'adjusted'})
         SubElement(lens, 'resolution', size)
-        for name, value in _metashape_lens(solution, index).items():
-            SubElement(lens, name).text = f'{value:.15g}'
-    for index in np.flatnonzero(solution.oriented).tolist():
+        add_texts(lens, _metashape_lens(solution, index))
+    for index in oriented(solution):
         about = {
             'id': str(index),
             'label': PurePath(network.photographs[index]).name,
@@ -200,20 +211,16 @@ def _metashape_cameras(chunk: Element, solution: Solution) -> None:
         camera = SubElement(cameras, 'camera', about)
         pose = np.eye(4)  # of the camera in the world
         pose[:3, :3], pose[:3, 3] = values.rotations[index].T, values.positions[index]
-        SubElement(camera, 'transform').text = _numbers(pose)
+        SubElement(camera, 'transform').text = numbers(pose)
 
 
-def _metashape_markers(chunk: Element, solution: Solution) -> None:
+def _metashape_markers(markers: Element, measured: Element, solution: Solution) -> None:
     network, values = solution.network, solution.state
-    points = SubElement(chunk, 'markers')
-    frame = SubElement(SubElement(chunk, 'frames'), 'frame', id='0')
-    measured = SubElement(frame, 'markers')
     elements = {}
-    for index in np.flatnonzero(solution.determined).tolist():
-        marker = SubElement(points, 'marker', id=str(index), label=network.targets[index])
-        x, y, z = (f'{value:.15g}' for value in values.points[index])
-        SubElement(marker, 'reference', x=x, y=y, z=z, enabled='true')
-        elements[index] = SubElement(measured, 'marker', marker_id=str(index))
+    for index in determined(solution):
+        place = [f'{value:.15g}' for value in values.points[index]]
+        label = network.targets[index]
+        elements[index] = _metashape_marker(markers, measured, index, label, place)
     seen = network.observations
     for row in np.flatnonzero(values.used):
         if int(seen.point[row]) in elements:
@@ -237,7 +244,7 @@ def mmvii_network_files(solution: Solution) -> dict[str, bytes]:
         if solution.calibrated[index]:
             name = _calibration_name(index)
             files[f'{_PROJECT}/Ori/{NAME}/{name}.xml'] = _mmvii_lens(solution, index)
-    for index in np.flatnonzero(solution.oriented).tolist():
+    for index in oriented(solution):
         image = PurePath(network.photographs[index]).name
         rows = np.flatnonzero(values.used & (network.observations.photograph == index))
         path = f'{_PROJECT}/Ori/{NAME}/Ori-PerspCentral-{image}.xml'
@@ -259,69 +266,58 @@ def _mmvii_lens(solution: Solution, index: int) -> bytes:
     SubElement(content, 'Name').text = f'"{_calibration_name(index)}"'
     SubElement(SubElement(content, 'PixelFrame'), 'NbPix').text = f'{view.width} {view.height}'
     SubElement(content, 'Projection').text = '"Stenope"'
+    degrees = {'Degree': '3 1 1', 'DegreeApproxInv': '3 1 1'}
     auxiliary = SubElement(content, 'Auxiliary')
-    for tag, text in (
-        ('SzBuffer', '-1'),
-        ('Degree', '3 1 1'),
-        ('DegreeApproxInv', '3 1 1'),
-        ('IsFraserMode', '1'),
-    ):
-        SubElement(auxiliary, tag).text = text
+    add_texts(auxiliary, {'SzBuffer': '-1', **degrees, 'IsFraserMode': '1'})
+    middle = f'{value["cx"]:.15g} {value["cy"]:.15g}'
     perfect = SubElement(content, 'PerfectProj')
-    SubElement(perfect, 'F').text = f'{value["f"]:.15g}'
-    SubElement(perfect, 'PP').text = f'{value["cx"]:.15g} {value["cy"]:.15g}'
+    add_texts(perfect, {'F': f'{value["f"]:.15g}', 'PP': middle})
     lens = SubElement(content, 'Distorsion')
     for group, names in (
         ('Radial', {'K1': 'k1', 'K2': 'k2', 'K3': 'k3'}),
         ('Decentric', {'p1': 'p2', 'p2': 'p1'}),
         ('Polynomial', {'b1': 'affinity', 'b2': 'shear'}),
     ):
-        terms = SubElement(lens, group)
-        for theirs, ours in names.items():
-            SubElement(terms, theirs).text = f'{value[ours]:.15g}'
+        terms = {theirs: f'{value[ours]:.15g}' for theirs, ours in names.items()}
+        add_texts(SubElement(lens, group), terms)
     return mmvii_file(content)
 
 
 def _mmvii_pose(solution: Solution, index: int, image: str) -> bytes:
     """Return a pose; the axes of the camera in the world are the rows of our rotation."""
     content = Element('CameraPose')
-    SubElement(content, 'NameImage').text = f'"{image}"'
-    camera = int(solution.network.camera_of[index])
-    SubElement(content, 'NameInternalCalib').text = f'"{_calibration_name(camera)}"'
-    SubElement(content, 'Center').text = _numbers(solution.state.positions[index])
-    axes = SubElement(content, 'RotMatrix')
-    for name, axis in zip('IJK', solution.state.rotations[index], strict=True):
-        SubElement(axes, f'Axe{name}').text = _numbers(axis)
+    calibration = _calibration_name(int(solution.network.camera_of[index]))
+    names = {'NameImage': f'"{image}"', 'NameInternalCalib': f'"{calibration}"'}
+    add_texts(content, {**names, 'Center': numbers(solution.state.positions[index])})
+    axes = zip('IJK', solution.state.rotations[index], strict=True)
+    turned = {f'Axe{name}': numbers(axis) for name, axis in axes}
+    add_texts(SubElement(content, 'RotMatrix'), turned)
     return mmvii_file(content)
 
 
 def _mmvii_measures(solution: Solution, rows: np.ndarray, image: str) -> bytes:
     seen = solution.network.observations
-    content = Element('SetMesIm')
-    SubElement(content, 'NameIm').text = f'"{image}"'
-    measures = SubElement(content, 'Measures')
-    for row in rows:
-        item = SubElement(measures, 'el')
-        SubElement(item, 'Name').text = f'"{solution.network.targets[seen.point[row]]}"'
-        SubElement(item, 'Pt').text = _numbers(seen.xy[row])
-        SubElement(item, 'Sigma2').text = _numbers(seen.covariance[row][np.triu_indices(2)])
-    return mmvii_file(content)
+    measures = [
+        {
+            'Name': f'"{solution.network.targets[seen.point[row]]}"',
+            'Pt': numbers(seen.xy[row]),
+            'Sigma2': numbers(seen.covariance[row][np.triu_indices(2)]),
+        }
+        for row in rows
+    ]
+    return _measures('SetMesIm', {'NameIm': f'"{image}"'}, measures)
 
 
 def _mmvii_points(solution: Solution) -> bytes:
-    content = Element('SetGCP')
-    SubElement(content, 'NameSet').text = f'"{NAME}"'
-    measures = SubElement(content, 'Measures')
-    for index in np.flatnonzero(solution.determined).tolist():
-        covariance = solution.point_covariances[index]
-        item = SubElement(measures, 'el')
-        SubElement(item, 'Name').text = f'"{solution.network.targets[index]}"'
-        SubElement(item, 'Pt').text = _numbers(solution.state.points[index])
-        SubElement(item, 'AdditionalInfo').text = '""'
-        # Six numbers: the upper triangle, row after row.
-        SubElement(item, '__Opt__Sigma2').text = _numbers(covariance[np.triu_indices(3)])
-    return mmvii_file(content)
-
-
-def _numbers(values: FloatArray) -> str:
-    return ' '.join(f'{value:.15g}' for value in np.ravel(values))
+    """Return points whose covariances are six numbers: the upper triangle, row after row."""
+    covariances = solution.point_covariances
+    points = [
+        {
+            'Name': f'"{solution.network.targets[index]}"',
+            'Pt': numbers(solution.state.points[index]),
+            'AdditionalInfo': '""',
+            '__Opt__Sigma2': numbers(covariances[index][np.triu_indices(3)]),
+        }
+        for index in determined(solution)
+    ]
+    return _measures('SetGCP', {'NameSet': f'"{NAME}"'}, points)

@@ -13,6 +13,7 @@ import numpy as np
 from ahf_ros.base.opening import LARGEST, Most, read_text, reader
 from ahf_ros.base.parsed_yaml import parsed_yaml
 from ahf_ros.base.text import shown
+from ahf_ros.files.files import text_of
 from ahf_ros.network.camera import (
     EQUIDISTANT,
     PARAMETERS,
@@ -176,13 +177,13 @@ def ros_yaml(view: CameraView, calibration: FloatArray, covariance: FloatArray) 
         _ros_matrix('rectification_matrix', np.eye(3)),
         _ros_matrix('projection_matrix', np.column_stack((matrix, np.zeros(3)))),
     ]
-    return ('\n'.join(rows) + '\n').encode()
+    return text_of(rows)
 
 
 def opencv_yaml(view: CameraView, calibration: FloatArray, covariance: FloatArray) -> bytes:
     """Return a calibration as cv2.FileStorage reads it, with the same fields as `ros_yaml`."""
     rows = _rows(view, calibration, covariance, _opencv_matrix)
-    return ('\n'.join(('%YAML:1.0', '---', *rows)) + '\n').encode()
+    return text_of(('%YAML:1.0', '---', *rows))
 
 
 def _rows(

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ahf_ros.base.opening import reader
+from ahf_ros.files.files import text_of
 from ahf_ros.files.tables import Row, one_of, read_by_image, read_table
 from ahf_ros.network.camera import rotation_matrices
 from ahf_ros.network.network import FloatArray
@@ -102,5 +103,5 @@ def mounting_files(record: dict[str, Any]) -> dict[str, bytes]:
         ]
     return {
         MOUNTING_FILE: json.dumps(record, indent=1, allow_nan=False).encode() + b'\n',
-        LAUNCH_FILE: '\n'.join(lines).encode() + b'\n',
+        LAUNCH_FILE: text_of(lines),
     }
