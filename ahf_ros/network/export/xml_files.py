@@ -35,8 +35,8 @@ def metashape_files(survey: Survey) -> dict[str, bytes]:
     document, sensors, cameras, points, measured = _metashape_document()
     elements = {}
     for index, label in enumerate(survey.labels):
-        place = [repr(float(value)) for value in survey.control.get(label, ())]
-        elements[label] = _metashape_marker(points, measured, index, label, place)
+        xyz = [repr(float(value)) for value in survey.control.get(label, ())]
+        elements[label] = _metashape_marker(points, measured, index, label, xyz)
     sizes: dict[tuple[int, int], str] = {}
     for index, photograph in enumerate(survey.photographs):
         size = width, height = photograph.width, photograph.height
@@ -48,8 +48,8 @@ def metashape_files(survey: Survey) -> dict[str, bytes]:
         camera = {'id': str(index), 'label': photograph.name, 'sensor_id': sizes[size]}
         SubElement(cameras, 'camera', camera)
         for mark in photograph.marks:
-            place = {'x': f'{mark.x:.6f}', 'y': f'{mark.y:.6f}'}
-            found = {'camera_id': str(index), 'pinned': 'true', **place}
+            x, y = f'{mark.x:.6f}', f'{mark.y:.6f}'
+            found = {'camera_id': str(index), 'pinned': 'true', 'x': x, 'y': y}
             SubElement(elements[mark.label], 'location', found)
     script = Path(metashape_console.__file__)
     return {'markers.xml': serialised(document), script.name: script.read_bytes()}
