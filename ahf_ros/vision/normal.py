@@ -27,7 +27,14 @@ def normal_integral(values: np.ndarray) -> np.ndarray:
     >>> normal_integral(np.array([-1.0, 0.0, 6.0])).round(3)
     array([0.159, 0.5  , 1.   ])
     """
-    return 0.5 * (1 + np.tanh(_SCALE * values * (1 + _CUBIC * values * values)))
+    share = _CUBIC * values
+    share *= values
+    share += 1
+    share *= _SCALE * values
+    share = np.tanh(share)
+    share += 1
+    share *= 0.5
+    return share
 
 
 def exact_normal_integral(values: np.ndarray) -> np.ndarray:

@@ -45,7 +45,8 @@ def rms(rings: Aligned, shown: Rendering) -> float:
 def test_pixels_place_rings_better_than_rays() -> None:
     shown = scene(**STRIPES, width=800, height=600, dot_radius=12.0)
     rings = rings_of(shown)
-    placed = jointly(as_float(shown), rings, circle_family(FAMILY))
+    gray = as_float(shown)
+    placed = jointly(gray, gray, rings, circle_family(FAMILY))
     assert rms(placed, shown) < 0.8 * rms(rings, shown)
     assert rms(placed, shown) < 0.01
 
@@ -69,7 +70,8 @@ def test_wrong_readings_are_put_right_by_pixels() -> None:
     ids[1] ^= 127
     margin[:3] = 0.0
     wrong = replace(right, ids=ids, margin=margin)
-    read = contested(as_float(shown), wrong, 1, circle_family(FAMILY))
+    gray = as_float(shown)
+    read = contested(gray, gray, wrong, 1, circle_family(FAMILY))
     assert read.ids.tolist() == right.ids.tolist()
     assert (read.confidence[:3] > 0.9).all()
 
@@ -87,7 +89,8 @@ def test_what_is_no_target_is_refused_by_pixels() -> None:
         margin=np.array([2.0]),
     )
     every = Aligned.joined([rings, false])
-    read = contested(image.astype(np.float32), every, 1, circle_family(FAMILY))
+    gray = image.astype(np.float32)
+    read = contested(gray, gray, every, 1, circle_family(FAMILY))
     assert (read.confidence[:-1] > 0.75).all()
     assert read.confidence[-1] < 0.1
 
@@ -95,13 +98,13 @@ def test_what_is_no_target_is_refused_by_pixels() -> None:
 def test_few_targets_and_none_stay_as_they_are_read() -> None:
     shown = scene(targets=2)
     rings = rings_of(shown)
-    family = circle_family(FAMILY)
-    read = contested(as_float(shown), rings, 1, family)
+    family, gray = circle_family(FAMILY), as_float(shown)
+    read = contested(gray, gray, rings, 1, family)
     assert read.ids.tolist() == rings.ids.tolist()
     assert not read.by_pixels.any()
     none = rings.select(np.zeros(0, int))
-    assert len(contested(as_float(shown), none, 1, family).ids) == 0
-    assert len(jointly(as_float(shown), none, family).ids) == 0
+    assert len(contested(gray, gray, none, 1, family).ids) == 0
+    assert len(jointly(gray, gray, none, family).ids) == 0
 
 
 @pytest.mark.lasting

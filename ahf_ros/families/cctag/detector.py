@@ -112,9 +112,9 @@ class CctagDetector(PyramidDetector):
             )
             ids = np.array([it.id for it in known])
             of = align(gray, start, ids, edges, family)
-            _, of = in_light(gray, of, family)
+            light, of, _ = in_light(gray, of, family)
             good = stayed(of.frames, start) & (of.rays >= _PLAUSIBLE)
-            of = of.replaced(good, jointly(gray, of.select(good), family))
+            of = of.replaced(good, jointly(gray, light, of.select(good), family))
             places = ellipse_fields(of.frames, of.covariance, of.edge_shift)
             refined = moved_targets(refined, known, places, good)
         return refined
@@ -130,7 +130,7 @@ class CctagDetector(PyramidDetector):
             if not self._shown(rings).any():  # rivals and pixels make none sure without others
                 continue
             rings = _owned(light, rings, look.polarity, look.family)
-            rings = contested(gray, rings, look.polarity, look.family)
+            rings = contested(gray, light, rings, look.polarity, look.family)
             found += self._targets(_single(rings), look)
         return found
 
@@ -249,15 +249,18 @@ def _identified(gray: np.ndarray, look: _Look) -> tuple[Aligned, np.ndarray]:
     possible = rings.select(rings.of_target >= _POSSIBLE)
     if not len(possible.ids):
         return possible, gray
-    light, again = in_light(gray, possible, family)
-    likely = again.select(again.of_target >= _SURE_OF_TARGET)
-    if not len(likely.ids):
+    light, again, lights = in_light(gray, possible, family)
+    placed = again.of_target >= _SURE_OF_TARGET
+    if not placed.any():
         return possible, gray
-    camera = look.prior.of_camera(likely)
+    camera = look.prior.of_camera(again.select(placed))
     # Where one edge of light leaves no doubt, others are not looked for.
     sure = (possible.confidence >= _SURE) & (again.of_target >= _SURE)
     told = replace(again, margin=possible.margin).select(sure)
-    lights = likely_lights(light, frames[_free(frames, told.frames)])
+    lights = lights.select(placed & ~sure)
+    known = lights.select(show_the_same(light, lights))
+    others = _free(frames, told.frames) & _alone(frames, lights.frames)
+    lights = Lights.joined([known, likely_lights(light, frames[others])])
     again = identify(light, lights, polarity, family, camera)
     rings = _best(_renewed(rings, Aligned.joined([told, again])), camera)
     sure = rings.of_target >= _SURE_OF_TARGET

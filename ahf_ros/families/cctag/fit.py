@@ -26,7 +26,7 @@ from ahf_ros.families.cctag.patch import (
 )
 from ahf_ros.families.cctag.prior import Prior
 from ahf_ros.vision import frame
-from ahf_ros.vision.robust import NORMAL, geman_mcclure
+from ahf_ros.vision.robust import NORMAL, geman_mcclure, medians
 
 _ENOUGH = 4  # targets, and edges of light, that tell what is usual
 _SHOWN = 0.3  # ln of the height of an edge of light that tells
@@ -145,8 +145,13 @@ class Usual:
         """Return the variances of gray values."""
         return self.noise[0] + self.noise[1] * np.maximum(shown, 0)
 
-    def prior(self, patch: Patch, formed: Formed) -> tuple[np.ndarray, np.ndarray]:
-        """Return the normal matrix (p, p) and the right side (p,) of what is known."""
+    def prior(
+        self, patch: Patch, formed: Formed, perspective: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return the normal matrix (p, p) and the right side (p,) of what is known.
+
+        That of perspective, (2, 2), is known of the target.
+        """
         weight, right = np.zeros((2, EDGES + formed.edges.size))
         weight[:] = _HARDLY
         weight[PRINT] = self.deviations[:3] ** -2
@@ -158,7 +163,6 @@ class Usual:
         of_edges[:, OF_LIGHT] += known
         to_usual[:, OF_LIGHT] = (self.values[3:] - values) / scales * known
         normal = np.diag(weight)
-        perspective = usual_perspective(formed.frame[None])[0]
         normal[PERSPECTIVE, PERSPECTIVE] += perspective
         right[PERSPECTIVE] -= perspective @ formed.frame[2, :2]
         return normal, right
@@ -172,12 +176,13 @@ def fitted(patch: Patch, formed: Formed, usual: Usual, most: float = math.inf) -
     seen, damping = patch.seen, _DAMPING[0]
     weights = 1 / usual.variances(seen)
     plain, changes = patch.shown(formed), patch.changes(formed)
+    perspective = usual_perspective(formed.frame[None])[0]
     for number, outlier in enumerate(_OUTLIERS):
         paper = _paper(weights, plain, seen)
         errors = seen - paper * plain
         variances = usual.variances(paper * plain)
         relative = errors / np.sqrt(variances)
-        spread = max(NORMAL * float(np.median(np.abs(relative))), _LEAST_SPREAD)
+        spread = max(NORMAL * float(medians(np.abs(relative)[None])[0]), _LEAST_SPREAD)
         weights = geman_mcclure(1 / variances, relative / (outlier * spread))
         free = max(float(weights @ variances) - len(changes), _FREE)
         best = float(weights @ errors**2)
@@ -185,7 +190,7 @@ def fitted(patch: Patch, formed: Formed, usual: Usual, most: float = math.inf) -
         columns = np.concatenate([paper * changes, plain[None]])
         normal = each * (columns * weights) @ columns.T
         right = each * columns @ (weights * errors)
-        known, towards = usual.prior(patch, formed)
+        known, towards = usual.prior(patch, formed, perspective)
         normal[:-1, :-1] += known
         right[:-1] += towards
         before = formed, plain

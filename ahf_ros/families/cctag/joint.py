@@ -8,7 +8,7 @@ of light are fitted to the pixels at once, for the place of targets and for doub
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from operator import itemgetter
 
 import numpy as np
@@ -36,32 +36,36 @@ _HOPELESS = 12.0  # the same, from which no ID is tried
 _CERTAIN, _ENOUGH = 0.98, 4  # confidence of targets that tell of doubtful ones, and their number
 _PROBABLE = 0.75  # probability of a target, from which it is placed
 _POSSIBLE, _MOST = 0.05, 128  # the same, from which it is read again, and number of these
-_RIVALS = 12  # IDs that rays may show
+_RIVALS = 6  # IDs that rays may show
 _ODDS, _LESS = 6.0, 2.0  # ln of the odds of a target that is usual, less by each deviation
 _BEYOND_DOUBT = 200.0  # cost more than the likeliest ID's, of one that is not fitted to the end
 _OF_MARGIN = 0.1  # share of ln of the odds of IDs, by pixels, that is believed
 
 
-def jointly(gray: np.ndarray, rings: Aligned, family: CctagPrint) -> Aligned:
+def jointly(gray: np.ndarray, light: np.ndarray, rings: Aligned, family: CctagPrint) -> Aligned:
     """Return rings (k,) that are in place to a part of a px, with places that pixels give.
 
+    They are in place in an image of light, which may be that of gray values.
     Large ones, and those that the model does not explain as well as others, stay as they are.
     """
     small = np.flatnonzero(_small(rings))
     if not len(small):
         return rings
     own = rings.select(small)
-    scene = _Scene.of(gray, own, np.arange(len(own.ids)), family)
+    scene = _Scene.of(gray, light, own, np.arange(len(own.ids)), family)
     for row, fit in scene.fits(own).items():
         placed = scene.placed(own.select(slice(row, row + 1)), fit)
         rings = rings.replaced(small[row : row + 1], placed)
     return rings
 
 
-def contested(gray: np.ndarray, rings: Aligned, polarity: int, family: CctagPrint) -> Aligned:
+def contested(
+    gray: np.ndarray, light: np.ndarray, rings: Aligned, polarity: int, family: CctagPrint
+) -> Aligned:
     """Return readings (k,) with the places that pixels give; what is in doubt is as pixels show.
 
-    Doubts need enough certain targets, which tell how well rings are seen in this image.
+    They are of an image of light, which may be that of gray values. Doubts need enough certain
+    targets, which tell how well rings are seen in this image.
     """
     enough = (_small(rings) & (rings.confidence >= _CERTAIN)).sum() >= _ENOUGH
     least = _POSSIBLE if enough else _PROBABLE
@@ -72,7 +76,7 @@ def contested(gray: np.ndarray, rings: Aligned, polarity: int, family: CctagPrin
     own = rings.select(which)
     certain = own.confidence >= _CERTAIN
     telling = np.flatnonzero(certain | np.logical_not(enough))
-    scene = _Scene.of(gray, own, telling, family)
+    scene = _Scene.of(gray, light, own, telling, family)
     for row, fit in scene.fits(own).items():
         reading = own.select(slice(row, row + 1))
         unusual = scene.usual.unusual(fit)
@@ -97,18 +101,26 @@ class _Scene:
     light: np.ndarray  # of the gray values, whose gamma is the next
     gamma: float
     family: CctagPrint
-    usual: Usual
-    begun: dict[int, Fit]  # of some targets, by their rows
+    usual: Usual = field(default_factory=Usual)
+    begun: dict[int, Fit] = field(default_factory=dict)  # of some targets, by their rows
 
     @staticmethod
-    def of(gray: np.ndarray, rings: Aligned, rows: np.ndarray, family: CctagPrint) -> _Scene:
-        """Return an image with what the likeliest of the targets in rows tell, gamma with it."""
-        telling = rows[np.argsort(-rings.plain[rows], kind='stable')[:_TELLING]]
-        tried = [
-            _Scene(gray, light, gamma, family, Usual(), {})._told(rings, telling)
-            for light, gamma in ((gray, 1.0), (as_light(gray), GAMMA))
-        ]
-        return min(tried, key=itemgetter(1))[0]
+    def of(
+        gray: np.ndarray, light: np.ndarray, rings: Aligned, rows: np.ndarray, family: CctagPrint
+    ) -> _Scene:
+        """Return an image with what the likeliest of the targets in rows tell, gamma with it.
+
+        Rays show clearly that gray values have a gamma, and less clearly that they have none.
+        """
+        rows = rows[np.argsort(-rings.plain[rows], kind='stable')[:_TELLING]]
+        telling = rings.select(rows)
+        if light is not gray:
+            return _Scene(gray, light, GAMMA, family)._told(telling, rows)[0]
+        linear = _Scene(gray, gray, 1.0, family)._told(telling, rows)
+        light, known = as_light(gray), (telling.frames, telling.ids, telling.edges, family)
+        telling = align(light, *known, rays=FEW_RAYS)
+        others = _Scene(gray, light, GAMMA, family)._told(telling, rows)
+        return min(linear, others, key=itemgetter(1))[0]
 
     def fits(self, rings: Aligned) -> dict[int, Fit]:
         """Return what forms the pixels of targets, by their rows, where enough are known.
@@ -168,7 +180,8 @@ class _Scene:
         Of IDs that rays may show, and those that differ in one ring or in all, the likeliest is
         taken. That is repeated for this one until it stays. IDs of other families are rivals.
         """
-        fits = {int(rings.ids[0]): fit} | self._rivals(rings, polarity, fit)
+        lights = Lights.about(self.light, rings.frames)
+        fits = {int(rings.ids[0]): fit} | self._rivals(rings, lights, polarity, fit)
         every = len(self.family.numbers) - 1
         while True:
             best = min(fits, key=lambda it: fits[it].cost(self.usual))
@@ -185,16 +198,16 @@ class _Scene:
         rivals = list(fits.values())
         for name in CCTAG_NAMES:
             if name != self.family.name:
-                scene = replace(self, family=circle_family(name), begun={})
-                rivals += scene._rivals(rings, polarity, fit).values()
+                scene = replace(self, family=circle_family(name))
+                rivals += scene._rivals(rings, lights, polarity, fit).values()
         margin = min(rival.cost(self.usual) for rival in rivals) - fit.cost(self.usual)
         reading = replace(rings, ids=np.array([best]), margin=np.array([_OF_MARGIN * margin]))
         return reading, fit
 
-    def _rivals(self, rings: Aligned, polarity: int, fit: Fit) -> dict[int, Fit]:
-        """Return fits of a target, (1,), by the IDs that rays may show besides."""
-        lights, camera = Lights.about(self.light, rings.frames), self.usual.camera
-        likely = likely_ids(self.light, lights, polarity, self.family, camera, _RIVALS)
+    def _rivals(self, rings: Aligned, lights: Lights, polarity: int, fit: Fit) -> dict[int, Fit]:
+        """Return fits of a target, (1,), by the IDs that rays may show besides in its lights."""
+        known = polarity, self.family, self.usual.camera
+        likely = likely_ids(self.light, lights, *known, _RIVALS)
         numbers, first = np.unique(likely.ids[0], return_index=True)
         larger = frame.mean_radii(likely.starts[0, first]) / frame.mean_radii(rings.frames)
         begun = frame.scaled(np.repeat(fit.formed.frame[None], len(first), axis=0), larger)
@@ -208,11 +221,8 @@ class _Scene:
             for number, of, start in zip(numbers.tolist(), circles, begun, strict=True)
         }
 
-    def _told(self, rings: Aligned, rows: np.ndarray) -> tuple[_Scene, float]:
-        """Return what targets in rows tell, and the usual error of gray values."""
-        telling = rings.select(rows)
-        frames, ids, edges = telling.frames, telling.ids, telling.edges
-        telling = align(self.light, frames, ids, edges, self.family, rays=FEW_RAYS)
+    def _told(self, telling: Aligned, rows: np.ndarray) -> tuple[_Scene, float]:
+        """Return what targets tell, those in rows, and the usual error of gray values."""
         usual = replace(self.usual, camera=Prior().of_camera(telling))
         scene = replace(self, usual=usual)
         fits = scene.fits(telling)

@@ -358,7 +358,7 @@ def _steps(edges: np.ndarray, x: np.ndarray, y: np.ndarray, width: np.ndarray) -
     """Return the steps of edges (k, e, 5) at points, in their heights, shape (k, e, m, n)."""
     share = normal_integral(_away(edges, x, y)[0] / _own_widths(edges, width))
     height, more = _growth(edges)
-    return np.log1p(more * share) / height
+    return np.log(1 + more * share) / height
 
 
 def _logarithms(share: np.ndarray, edges: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -367,7 +367,7 @@ def _logarithms(share: np.ndarray, edges: np.ndarray) -> tuple[np.ndarray, np.nd
     Blur mixes light, and not its logarithm.
     """
     height, more = _growth(edges)
-    return np.log1p(more * share) / height, more / height / (1 + more * share)
+    return np.log(1 + more * share) / height, more / height / (1 + more * share)
 
 
 def _growth(edges: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

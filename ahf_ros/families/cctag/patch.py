@@ -8,8 +8,9 @@ samples a pixel are enough.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import Any
 
 import numpy as np
 
@@ -29,7 +30,7 @@ OF_LIGHT = [_CURVATURE, _WIDTH]
 """What is alike of all edges of light."""
 _REACH = 1.35  # radii, up to which pixels are seen
 _FINE = 2  # samples a px along each axis
-_SHARP = 0.2  # blur of what is sharp, px
+_SHARP = 1 / (_FINE * math.sqrt(6))  # blur of what is sharp, px: a triangle over two samples
 _MARGIN, _OF_MASK = 3, 4  # px about the pixels, that blur and an unsharp mask mix with them
 _DARK = 1e-4  # light, of that on paper, that is black
 _OF_INTERPOLATION = 0.17  # variance that reading between pixels adds to the blur of rays, px^2
@@ -37,7 +38,6 @@ _BLURS = 0.35, 2.0  # px
 _DARKEST = -0.99  # contrast
 _MOST_CURVED, _HIGHEST, _WIDEST = 1.5, 5.0, 0.0  # edges of light: 1 / radii, ln, ln of radii
 _MOST_OF_FRAME, _MOST = 0.08, 0.3  # changes at once
-_APART = 1.02  # ratio of the blurs whose difference is taken
 
 
 @dataclass(frozen=True, slots=True)
@@ -169,153 +169,166 @@ class Patch:
         formed = Formed(
             rings.frames[0], float(rings.shift[0]), blur, 0.0, light.heights[0, :2], edges
         )
-        bright = np.exp(self._logarithm(formed))
-        ink = self._ink(np.hypot(*self._in_frame(formed)), formed.shift)
-        both = self._blurred(np.stack([bright, bright * ink]), blur)[:, self.known].T
+        bright = self._light(formed)[0]
+        inked = bright * self._ink(formed)[0]
+        both = self._blurred(np.stack([bright, inked], axis=1), blur)
+        both = both.transpose(1, 0, 2)[:, self.known].T
         seen = (self.seen / self.seen.max()) ** self.gamma
         paper, step = np.linalg.lstsq(both.T @ both, both.T @ seen, rcond=None)[0]
         return replace(formed, contrast=max(float(step / max(paper, _DARK)), _DARKEST))
 
     def shown(self, formed: Formed) -> np.ndarray:
         """Return the gray values that are formed where paper in full light is 1, (n,)."""
-        x, y = self._in_frame(formed)
-        ink = self._ink(np.hypot(x, y), formed.shift)
-        sharp = np.exp(self._logarithm(formed)) * (1 + formed.contrast * ink)
-        shown: np.ndarray = self._taken(self._blurred(sharp[None], formed.blur))[0]
-        return shown
+        light = self._light(formed)[0]
+        sharp = light * (1 + formed.contrast * self._ink(formed)[0])
+        return self._taken(self._blurred(sharp[:, None], formed.blur))[0]
 
     def changes(self, formed: Formed) -> np.ndarray:
-        """Return the derivatives of `shown` by all parameters, (p, n)."""
-        x, y = self._in_frame(formed)
-        radius = np.maximum(np.hypot(x, y), np.float32(1e-6))
-        ink, by_radius, by_shift = self._ink_changes(radius, formed.shift)
-        light, by_light = self._light_changes(formed)
-        sharp = light * (1 + formed.contrast * ink)
-        on_ink = light * formed.contrast
-        by_radius *= on_ink
-        cosine, sine = x / radius, y / radius
-        turned = by_radius * cosine, by_radius * sine
-        changes = [
-            sharp,
-            *turned,
-            by_radius * radius,
-            turned[0] * x - turned[1] * y,
-            2 * turned[0] * y,
-            -x * (by_radius * radius),
-            -y * (by_radius * radius),
-            on_ink * by_shift,
-            light * ink,
-            *(sharp * of for of in by_light),
-        ]
-        mixed = self._blurred(np.stack(changes), formed.blur)
-        wider, narrower = (
-            self._blurred(sharp[None], formed.blur * of) for of in (_APART, 1 / _APART)
-        )
-        by_blur = (wider - narrower) / (2 * math.log(_APART))
-        return self._taken(np.insert(mixed, SHIFT + 2, by_blur, axis=0))[1:]
+        """Return the derivatives of `shown` by all parameters, (p, n).
+
+        What edges of light change at places far from them is multiplied after blur, not before.
+        """
+        light, of_edges = self._light(formed)
+        ink, *turned, by_shift = self._ink(formed, changes=True)
+        sharp, on_ink = light * (1 + formed.contrast * ink), light * formed.contrast
+        (across, down), (x, y) = (on_ink * of for of in turned), self._in_frame(formed)
+        outwards = across * x + down * y
+        images = [sharp, across, down, outwards, across * x - down * y, 2 * across * y]
+        images += [-x * outwards, -y * outwards, on_ink * by_shift, light * ink]
+        images += [sharp * of for edge in of_edges for of in edge[:3]]
+        mixed = self._blurred(np.stack(images, axis=1), formed.blur, by_blur=True)
+        first, *of_print, by_blur = self._taken(mixed)
+        of_print, of_light = of_print[:CONTRAST], of_print[CONTRAST:]
+        changes = [*of_print[:BLUR], by_blur, *of_print[BLUR:]]
+        gray = first / self.gamma
+        changes += [gray * self._at_pixels(of) for of in (self.light_x, self.light_y)]
+        for number, (edge, of) in enumerate(zip(formed.edges.tolist(), of_edges, strict=True)):
+            density, by_height, by_width = of_light[3 * number : 3 * number + 3]
+            along_it, across_it = (self._at_pixels(it) for it in of[3:])
+            _, offset, curvature, *_ = edge
+            changes += [
+                density * along_it * (1 + curvature * offset),
+                density * (curvature * across_it - 1),
+                density * (across_it**2 + along_it**2) / -2,
+                by_height,
+                by_width,
+            ]
+        return np.stack(changes)
 
     def _in_frame(self, formed: Formed) -> tuple[np.ndarray, np.ndarray]:
         """Return x and y of fine points, radii, in the plane of the target."""
         return _in_plane(formed.frame, self.fine_x, self.fine_y)
 
-    def _circles_away(
-        self, radius: np.ndarray, shift: float
-    ) -> Iterator[tuple[float, np.ndarray]]:
-        """Yield the signs of circles, and how far they are outside of fine points, in blurs."""
-        scale = self._sharpness(radius)
-        for circle in self.circles.tolist():
-            sign = math.copysign(1.0, circle)
-            yield sign, (abs(circle) - radius) * scale + sign * shift / _SHARP
+    def _at_pixels(self, fine: np.ndarray) -> np.ndarray:
+        """Return values of fine points (m, n) at known pixels, (n,)."""
+        inner = slice(_MARGIN * _FINE, -_MARGIN * _FINE, _FINE)
+        return fine[inner, inner][self.known]
 
-    def _ink(self, radius: np.ndarray, shift: float) -> np.ndarray:
-        """Return the ink at fine points, (m, n)."""
-        circles = self._circles_away(radius, shift)
-        return np.asarray(sum(sign * normal_integral(away) for sign, away in circles))
+    def _ink(self, formed: Formed, changes: bool = False) -> tuple[np.ndarray, ...]:
+        """Return the ink at fine points, (m, n), and its derivatives by x, y and the shift.
 
-    def _ink_changes(self, radius: np.ndarray, shift: float) -> tuple[np.ndarray, ...]:
-        """Return the ink at fine points, and its derivatives by the radius and shift."""
-        ink, by_radius, by_shift = np.zeros((3, *radius.shape), np.float32)
-        for sign, away in self._circles_away(radius, shift):
-            density = np.exp(-0.5 * away**2)
-            ink += sign * normal_integral(away)
-            by_radius += sign * density
-            by_shift += density
-        by_radius *= self._sharpness(radius) / math.sqrt(2 * math.pi)
-        by_shift /= _SHARP * math.sqrt(2 * math.pi)
-        return ink, by_radius, by_shift
-
-    def _sharpness(self, radius: np.ndarray) -> np.ndarray:
-        """Return how many blurs of what is sharp a radius is at fine points, (m, n)."""
-        sharpness: np.ndarray = 1 / np.maximum(
-            np.hypot(*np.gradient(radius, 1 / _FINE)) * np.float32(_SHARP), np.float32(1e-6)
-        )
-        return sharpness
-
-    def _logarithm(self, formed: Formed) -> np.ndarray:
-        """Return ln of the light at fine points, (m, n)."""
-        logarithm = formed.slopes[0] * self.light_x + formed.slopes[1] * self.light_y
-        for edge in formed.edges.tolist():
-            away = self._edge_away(edge)[0]
-            logarithm = logarithm + np.log1p(math.expm1(edge[_HEIGHT]) * normal_integral(away))
-        return logarithm
-
-    def _edge_away(self, edge: list[float]) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
-        """Return how far fine points are from an edge of light, in its widths.
-
-        The next are their distances across and along it, radii, and the width.
+        Edges are those of a triangular blur as wide as two fine points are apart.
         """
-        direction, offset, curvature, _, width = edge
+        x, y = self._in_frame(formed)
+        radius = np.sqrt(x * x + y * y) + np.float32(1e-6)
+        (a, b), (_, c) = _of_gradient(formed.frame)
+        scale = np.sqrt((a * x + 2 * b * y) * x + c * y * y + np.float32(1e-12))
+        scale = radius / scale * np.float32(_FINE)
+        signs = np.sign(self.circles).astype(np.float32)
+        grown = (signs * np.float32(formed.shift * _FINE))[:, None, None]
+        away = np.abs(self.circles).astype(np.float32)[:, None, None] - radius
+        away *= scale
+        away += grown
+        np.clip(away, -1, 1, out=away)
+        density = 1 - np.abs(away)
+        away *= 1 + density
+        ink = (signs @ away.reshape(len(signs), -1)).reshape(radius.shape) / 2
+        if not changes:
+            return (ink,)
+        by_radius = (signs @ density.reshape(len(signs), -1)).reshape(radius.shape)
+        by_radius *= scale / radius
+        return ink, by_radius * x, by_radius * y, density.sum(axis=0) * _FINE
+
+    def _light(self, formed: Formed) -> tuple[np.ndarray, list[tuple[Any, ...]]]:
+        """Return light at fine points, (m, n), and what it changes by at each of its edges.
+
+        These are shares of it: density, change by the height and by the width. The last two are
+        distances along and across an edge, radii.
+        """
         x, y = self.light_x, self.light_y
-        cosine, sine = math.cos(direction), math.sin(direction)
-        across, along = cosine * x + sine * y - offset, cosine * y - sine * x
-        wide = max(math.exp(width), _SHARP / self.light_size)
-        return (across - curvature / 2 * (across**2 + along**2)) / wide, across, along, wide
-
-    def _light_changes(self, formed: Formed) -> tuple[np.ndarray, list[np.ndarray]]:
-        """Return light at fine points, (m, n), and its derivatives as shares of it, 2 + 5 e."""
-        logarithm = formed.slopes[0] * self.light_x + formed.slopes[1] * self.light_y
-        changes = [self.light_x, self.light_y]
-        for edge in formed.edges.tolist():
-            _, offset, curvature, height, _ = edge
-            away, across, along, wide = self._edge_away(edge)
+        along_x, along_y = formed.slopes.tolist()
+        light, changes = np.exp(along_x * x + along_y * y), []
+        for direction, offset, curvature, height, width in formed.edges.tolist():
+            cosine, sine = math.cos(direction), math.sin(direction)
+            across, along = cosine * x + sine * y - offset, cosine * y - sine * x
+            wide = max(math.exp(width), _SHARP / self.light_size)
+            away = (across - curvature / 2 * (across**2 + along**2)) / wide
             share, more = normal_integral(away), math.expm1(height)
-            light = 1 + more * share
-            logarithm = logarithm + np.log(light)
-            density = np.exp(-0.5 * away**2) / light * (more / (wide * math.sqrt(2 * math.pi)))
-            changes += [
-                density * along * (1 + curvature * offset),
-                density * (curvature * across - 1),
-                density * (across**2 + along**2) / -2,
-                math.exp(height) * share / light,
-                density * away * -wide,
-            ]
-        return np.exp(logarithm), changes
+            own = 1 + more * share
+            light = light * own
+            density = np.exp(-0.5 * away**2) / own * (more / (wide * math.sqrt(2 * math.pi)))
+            by_height = math.exp(height) * share / own
+            changes.append((density, by_height, density * away * -wide, along, across))
+        return light, changes
 
-    def _blurred(self, sharp: np.ndarray, blur: float) -> np.ndarray:
-        """Return the light on pixels, (p, h, w), of what is sharp at fine points."""
+    def _blurred(self, sharp: np.ndarray, blur: float, by_blur: bool = False) -> np.ndarray:
+        """Return the light on pixels, (h, p, w), of what is sharp at fine points, (m, p, n).
+
+        The change of the first by ln of the blur follows if that is asked for.
+        """
         rest = math.sqrt(max(blur**2 - _SHARP**2, 0.01))
-        return _mixed(sharp, self.rows / rest, self.columns / rest)
+        (down, more_down), (across, more_across) = (
+            _weights(of / rest) for of in (self.rows, self.columns)
+        )
+        mixed = _mixed(sharp, down, across)
+        if by_blur:
+            first = sharp[:, :1]
+            change = _mixed(first, more_down, across) + _mixed(first, down, more_across)
+            mixed = np.concatenate([mixed, change * np.float32((blur / rest) ** 2)], axis=1)
+        return mixed
 
     def _taken(self, light: np.ndarray) -> np.ndarray:
-        """Return gray values of known pixels, (p, n), of light and of changes of it, (p, h, w)."""
+        """Return gray values of known pixels, (p, n), of light and of changes of it, (h, p, w)."""
         if self.gamma != 1:
-            first = np.maximum(light[0], _DARK)
-            gray = first ** (1 / self.gamma)
-            light = light * (gray / first / self.gamma)
-            light[0] = gray
+            first = np.maximum(light[:, :1], np.float32(_DARK))
+            gray = first ** np.float32(1 / self.gamma)
+            light = light * (gray / first / np.float32(self.gamma))
+            light[:, :1] = gray
         if self.sharpening:
-            y, x = (np.arange(of, dtype=np.float32) / MASK for of in self.known.shape)
-            mask = _mixed(light, y[:, None] - y, x[:, None] - x)
-            light = light + self.sharpening * (light - mask)
-        return light[:, self.known]
+            mask = _mixed(light, *(_mask_weights(size) for size in self.known.shape))
+            light = light + np.float32(self.sharpening) * (light - mask)
+        return light.transpose(1, 0, 2)[:, self.known]
 
 
-def _mixed(values: np.ndarray, rows: np.ndarray, columns: np.ndarray) -> np.ndarray:
-    """Return means of values (p, m, n) by normal weights, of deviations (h, m) and (w, n)."""
-    down, across = (np.exp(-0.5 * of**2) for of in (rows, columns))
-    down /= down.sum(axis=1, keepdims=True)
-    across /= across.sum(axis=1, keepdims=True)
-    return down @ values @ across.T
+def _weights(away: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return normal weights of a sum of 1 for deviations (h, m), changes by ln of width."""
+    square = away * away
+    weights = np.exp(-0.5 * square)
+    weights /= weights.sum(axis=1, keepdims=True)
+    return weights, weights * (square - (weights * square).sum(axis=1, keepdims=True))
+
+
+@lru_cache
+def _mask_weights(size: int) -> np.ndarray:
+    """Return the weights by which an unsharp mask mixes so many pixels in a row."""
+    places = np.arange(size, dtype=np.float32) / MASK
+    return _weights(places[:, None] - places)[0]
+
+
+def _mixed(values: np.ndarray, down: np.ndarray, across: np.ndarray) -> np.ndarray:
+    """Return means (h, p, w) of values (m, p, n) by weights (h, m) and (w, n)."""
+    rows, images, columns = values.shape
+    mixed = (down @ values.reshape(rows, -1)).reshape(-1, columns) @ across.T
+    return mixed.reshape(len(down), images, len(across))
+
+
+def _of_gradient(target: np.ndarray) -> np.ndarray:
+    """Return the matrix whose form is the square of how the radius grows by pixels, times itself.
+
+    The perspective hardly changes it within a target.
+    """
+    inverse = np.linalg.inv(frame.local_affine(target[None])[0])
+    return (inverse @ inverse.T).astype(np.float32)
 
 
 def _in_plane(
@@ -323,8 +336,10 @@ def _in_plane(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return x and y, radii, float32, of a grid of pixels in the plane of a frame, (m, n)."""
     inverse = np.linalg.inv(target)
-    at_centre = inverse @ (*target[:2, 2], 1.0)  # single precision is enough from there
-    along_x = np.outer(inverse[:, 0], columns - target[0, 2]).astype(np.float32)
-    along_y = np.outer(inverse[:, 1], rows - target[1, 2]) + at_centre[:, None]
-    x, y, scale = along_x[:, None] + along_y.astype(np.float32)[..., None]
+    scale = inverse[2] @ (*target[:2, 2], 1.0)  # single precision is enough from there
+    by_x, by_y, _ = (inverse / scale).astype(np.float32).T[..., None, None]
+    across = (columns - target[0, 2]).astype(np.float32)
+    down = (rows - target[1, 2]).astype(np.float32)
+    x, y, scale = by_x * across + by_y * down[:, None]
+    scale += 1
     return x / scale, y / scale

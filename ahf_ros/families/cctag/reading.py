@@ -21,6 +21,7 @@ _CLEARLY = 0.03  # `left` by which rings must be better explained
 _CLEAREST = 16  # targets by which an image is compared with its light
 _REPEATS, _STAYING = 6, 0.1  # until the square of a move is a small part of the variance
 _HOPELESS = 1e-6, 1e-4  # probabilities of a target, up to which one ID is enough: at first, later
+_IN_PLACE = 0.03  # change of a frame, radii, that leaves the light about it as it is
 _UNLIKELY = 1e-3  # the same, up to which no place is settled, which hardly changes it
 _BEYOND_DOUBT = 8.0  # cost more than that of the likeliest ID, from which no other is tried
 
@@ -57,10 +58,14 @@ def identify(
     possible = first.of_target > _HOPELESS[0]
     if not possible.any():
         return NOTHING
-    lights = Lights.about(gray, first.frames[possible], most)
-    again = likely_ids(gray, lights, polarity, family, prior)
-    likely = again.beside(likely.select(possible))
-    first = align(gray, *likely.first, family, prior, lights, FEW_RAYS)
+    first, likely = first.select(possible), likely.select(possible)
+    lights = lights.select(possible)
+    moved = np.flatnonzero(_moved(lights.frames, first.frames))
+    lights = lights.replaced(moved, Lights.about(gray, first.frames[moved], most))
+    others = likely_ids(gray, lights.select(moved), polarity, family, prior)
+    likely = likely.replaced(moved, others).beside(likely)
+    again = align(gray, *others.first, family, prior, lights.select(moved), FEW_RAYS)
+    first = first.replaced(moved, again)
     possible = first.of_target > _HOPELESS[1]
     if not possible.any():
         return NOTHING
@@ -69,6 +74,13 @@ def identify(
     possible = (best.of_target > _UNLIKELY) & (best.colour == polarity)
     best = _settled(gray, best.select(possible), family, prior, lights.select(possible))
     return best.select(best.colour == polarity)
+
+
+def _moved(frames: np.ndarray, others: np.ndarray) -> np.ndarray:
+    """Return whether the light about frames (k, 3, 3) is not that about others, (k,)."""
+    size, other = frame.mean_radii(frames), frame.mean_radii(others)
+    away = np.hypot(*(frames - others)[:, :2, 2].T)
+    return np.asarray(np.maximum(away, np.abs(size - other)) > _IN_PLACE * size)
 
 
 def _likeliest(
@@ -128,16 +140,21 @@ def _settled(
     return rings
 
 
-def in_light(gray: np.ndarray, rings: Aligned, family: CctagPrint) -> tuple[np.ndarray, Aligned]:
+def in_light(
+    gray: np.ndarray, rings: Aligned, family: CctagPrint
+) -> tuple[np.ndarray, Aligned, Lights]:
     """Return an image of light, where rings show clearly that its gray values have a gamma.
 
     Blur mixes light, and not gray values, which matters where rings are narrow. The image is the
-    same otherwise. The rings are brought onto it.
+    same otherwise. The rings are brought onto it, in the lights that follow.
     """
     light = as_light(gray)
-    again = align(light, rings.frames, rings.ids, rings.edges, family)
+    lights = Lights.about(light, rings.frames)
+    known = rings.frames, rings.ids, rings.edges, family
+    again = align(light, *known, lights=lights)
     clearest = np.argsort(-rings.plain, kind='stable')[:_CLEAREST]
     weight = np.maximum(rings.of_target, again.of_target)[clearest]
     if weight @ (again.left - rings.left + _CLEARLY)[clearest] < 0:
-        return light, again
-    return gray, align(gray, rings.frames, rings.ids, rings.edges, family)
+        return light, again, lights
+    lights = Lights.about(gray, rings.frames)
+    return gray, align(gray, *known, lights=lights), lights
