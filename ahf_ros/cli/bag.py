@@ -22,13 +22,15 @@ from ahf_ros.cli import say, tell
 from ahf_ros.cli.engines import create_engine, progress_bar, shared_settings
 from ahf_ros.cli.options import (
     add_engine_options,
+    add_flag,
+    add_input,
     add_option,
     add_options,
+    add_output,
     add_registration_options,
     add_search_options,
     add_target_options,
     input_path,
-    output_path,
     settings_from,
 )
 from ahf_ros.clouds.cloud_settings import CloudSettings
@@ -50,20 +52,13 @@ _LOCK_TIMEOUT = 2 * SHUTDOWN_TIMEOUT  # s
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Give a parser the arguments of the command."""
-    parser.add_argument(
-        'bags',
-        nargs='+',
-        type=input_path,
-        metavar='IN',
-        help='Bags: ROS 2 folders, .db3 or .mcap files, or ROS 1 .bag files.',
+    text = 'Bags: ROS 2 folders, .db3 or .mcap files, or ROS 1 .bag files.'
+    add_input(parser, 'bags', 'IN', text, type=input_path, nargs='+')
+    text = (
+        'Output bag, a folder; for several bags, the folder for their output bags. An '
+        'unfinished output bag is continued.'
     )
-    parser.add_argument(
-        'output',
-        type=output_path,
-        metavar='OUT',
-        help='Output bag, a folder; for several bags, the folder for their output bags. An '
-        'unfinished output bag is continued.',
-    )
+    add_output(parser, 'output', 'OUT', text)
     parser.add_argument(
         '--topic',
         action='append',
@@ -78,9 +73,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     storages = 'mcap', 'sqlite3'
     text = 'Storage format of the output bag.'
     add_option(parser, Parameter('storage', 'mcap', text, choices=storages))
-    parser.add_argument(
-        '--debug-images', action='store_true', help='Also write annotated images, as JPEG.'
-    )
+    add_flag(parser, '--debug-images', 'Also write annotated images, as JPEG.')
     text = 'Number of bags processed at the same time.'
     add_engine_options(parser, Parameter('jobs', 1, text, minimum=1))
     add_target_options(parser)
@@ -88,13 +81,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_search_options(parser)
     text = 'Of scans, images with organised clouds, as the node registration does it.'
     group = parser.add_argument_group('registration', text)
-    group.add_argument(
-        '--register',
-        type=output_path,
-        metavar='DIR',
-        help='Register all scans, and write clouds, transforms and targets to this folder, as '
-        '~/save does; for several bags, the folder for their folders.',
+    text = (
+        'Register all scans, and write clouds, transforms and targets to this folder, as '
+        '~/save does; for several bags, the folder for their folders.'
     )
+    add_output(group, '--register', 'DIR', text)
     text = 'Topic of the clouds; empty: the only one.'
     add_option(group, Parameter('cloud_topic', '', text))
     add_registration_options(group)

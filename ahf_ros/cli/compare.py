@@ -11,7 +11,15 @@ from typing import TYPE_CHECKING, Any
 
 from ahf_ros.base.settings.parameter import Parameter
 from ahf_ros.cli import say, tell
-from ahf_ros.cli.options import add_option, add_quiet, input_path, output_path, parsed_by
+from ahf_ros.cli.options import (
+    add_flag,
+    add_input,
+    add_option,
+    add_quiet,
+    input_path,
+    output_path,
+    parsed_by,
+)
 from ahf_ros.cli.tables import identifiers, print_table
 from ahf_ros.network.units import decimals
 
@@ -23,12 +31,8 @@ _FORMATS = '.csv', '.svg'
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Give a parser the arguments of the command."""
-    parser.add_argument(
-        'first', type=input_path, metavar='EPOCH1', help='Folder that ahf orient wrote.'
-    )
-    parser.add_argument(
-        'second', type=input_path, metavar='EPOCH2', help='The same, of the later epoch.'
-    )
+    add_input(parser, 'first', 'EPOCH1', 'Folder that ahf orient wrote.', type=input_path)
+    add_input(parser, 'second', 'EPOCH2', 'The same, of the later epoch.', type=input_path)
     parser.add_argument(
         '-o',
         '--output',
@@ -55,9 +59,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     text = 'Share of epochs without movement that are taken for ones with.'
     add_option(parser, Parameter('level', 0.05, text, minimum=1e-6, maximum=0.5))
-    parser.add_argument(
-        '--json', action='store_true', help='Print one JSON object on standard output.'
-    )
+    add_flag(parser, '--json', 'Print one JSON object on standard output.')
     add_quiet(parser)
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from ahf_ros.base.opening import file_errors
 from ahf_ros.base.settings.parameter import Parameter
 from ahf_ros.base.target import Identification, Target, TrueTarget
-from ahf_ros.cli.options import add_option, output_path
+from ahf_ros.cli.options import add_option, add_output
 from ahf_ros.files.image_files import write_image
 from ahf_ros.identification.filtering.homomorphic import filtered
 from ahf_ros.identification.session import create_identifier
@@ -48,13 +48,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     text = 'Ambient light as a share of the projected light.'
     add_option(parser, Parameter('ambient', scene.ambient, text))
     add_option(parser, Parameter('seed', scene.seed, 'Seed of the image.'))
-    parser.add_argument(
-        '--output',
-        type=output_path,
-        default='demo',
-        metavar='DIR',
-        help='Folder for the picture. Default: demo.',
-    )
+    add_output(parser, '--output', 'DIR', 'Folder for the picture. Default: demo.', default='demo')
 
 
 def run(options: argparse.Namespace) -> int:

@@ -8,7 +8,7 @@ from typing import Any
 from ahf_ros.base.settings.parameter import Parameter
 from ahf_ros.base.text import printable
 from ahf_ros.cli import tell
-from ahf_ros.cli.options import add_option, input_name
+from ahf_ros.cli.options import add_flag, add_input, add_option
 from ahf_ros.files.target_json import read_results
 from ahf_ros.files.truth_files import read_truth
 from ahf_ros.scenes.evaluation import TOLERANCE, Score, evaluate, table, total
@@ -16,20 +16,11 @@ from ahf_ros.scenes.evaluation import TOLERANCE, Score, evaluate, table, total
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Give a parser the arguments of the command."""
-    parser.add_argument(
-        'truth', type=input_name, metavar='TRUTH.csv', help='Columns image, id, x, y[, confirmed].'
-    )
-    parser.add_argument(
-        'results',
-        type=input_name,
-        metavar='RESULTS.jsonl',
-        help='One JSON object per image; - is standard input.',
-    )
-    parser.add_argument(
-        '--json',
-        action='store_true',
-        help='Print one JSON object per image on standard output, and a last one for all images.',
-    )
+    add_input(parser, 'truth', 'TRUTH.csv', 'Columns image, id, x, y[, confirmed].')
+    text = 'One JSON object per image; - is standard input.'
+    add_input(parser, 'results', 'RESULTS.jsonl', text)
+    text = 'Print one JSON object per image on standard output, and a last one for all images.'
+    add_flag(parser, '--json', text)
     text = 'Maximum distance between a target and the truth, px.'
     add_option(parser, Parameter('tolerance', TOLERANCE, text, minimum=1e-3))
 

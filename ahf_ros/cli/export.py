@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from ahf_ros.base.settings.parameter import Parameter
 from ahf_ros.base.text import counted
 from ahf_ros.cli import say, tell
-from ahf_ros.cli.options import Group, add_option, input_name, parsed_by
+from ahf_ros.cli.options import Group, add_input, add_option, parsed_by
 from ahf_ros.network.export.formats import FORMATS, Export
 
 if TYPE_CHECKING:
@@ -23,12 +23,8 @@ _FOLDER = f'to a folder as other software reads them: {", ".join(FORMATS)}.'
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Give a parser the arguments of the command."""
-    parser.add_argument(
-        'results',
-        type=input_name,
-        metavar='RESULTS.jsonl',
-        help='One JSON object per image; - is standard input.',
-    )
+    text = 'One JSON object per image; - is standard input.'
+    add_input(parser, 'results', 'RESULTS.jsonl', text)
     parser.add_argument(
         'export',
         nargs='+',
@@ -53,12 +49,7 @@ def add_export_arguments(parser: Group) -> None:
 
 
 def _add_control_arguments(parser: Group) -> None:
-    parser.add_argument(
-        '--control',
-        type=input_name,
-        metavar='POINTS.csv',
-        help='Control points to export: ID, x, y, z.',
-    )
+    add_input(parser, '--control', 'POINTS.csv', 'Control points to export: ID, x, y, z.')
     text = (
         'Coordinate reference system of the control points, such as EPSG:25832; empty for local '
         'coordinates.'

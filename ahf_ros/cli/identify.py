@@ -31,12 +31,12 @@ from ahf_ros.cli.engines import create_engine, progress_bar, shared_settings
 from ahf_ros.cli.export import add_export_arguments, check_control, control_from, write_exports
 from ahf_ros.cli.options import (
     add_image_options,
+    add_input,
     add_option,
+    add_output,
     add_output_options,
     add_search_options,
     add_target_options,
-    input_name,
-    output_path,
     settings_from,
 )
 from ahf_ros.files.files import RESULTS_FILE
@@ -53,26 +53,21 @@ _WORTH_PROCESSES = 4  # images; fewer are identified before processes have start
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Give a parser the arguments of the command."""
-    parser.add_argument(
-        'images',
-        nargs='+',
-        type=input_name,
-        metavar='IMAGE',
-        help='Image files; folders, for their images; patterns in quotation marks, such as '
+    text = (
+        'Image files; folders, for their images; patterns in quotation marks, such as '
         '"day*/*.jpg" or "**/*.tif"; URLs of storages that fsspec reads, such as s3:// and '
-        'https://; @FILE for a list of these, one a line.',
+        'https://; @FILE for a list of these, one a line.'
     )
+    add_input(parser, 'images', 'IMAGE', text, nargs='+')
     add_image_options(parser)
     add_target_options(parser)
     output = parser.add_argument_group('output')
-    output.add_argument(
-        '--output',
-        type=output_path,
-        metavar='DIR',
-        help=f'Write results to {RESULTS_FILE} in this folder as they come. The same command '
+    text = (
+        f'Write results to {RESULTS_FILE} in this folder as they come. The same command '
         'again goes on where it was interrupted; files that have changed, and all with other '
-        'settings, are identified again.',
+        'settings, are identified again.'
     )
+    add_output(output, '--output', 'DIR', text)
     add_output_options(output)
     add_export_arguments(parser.add_argument_group('export'))
     stacks = parser.add_argument_group('stacks')

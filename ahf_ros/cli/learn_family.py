@@ -16,7 +16,7 @@ from ahf_ros.base.settings.parameter import parameters
 from ahf_ros.base.writing import write_files, write_whole
 from ahf_ros.cli import say, tell
 from ahf_ros.cli.identify import image_paths
-from ahf_ros.cli.options import add_option, input_name, output_path
+from ahf_ros.cli.options import add_input, add_option, add_output
 from ahf_ros.families.contract import DetectorSettings
 
 if TYPE_CHECKING:
@@ -34,37 +34,27 @@ _AROUND = 1.15  # radius of what is shown of a target, in that of its band
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Give a parser the arguments of the command."""
-    parser.add_argument(
-        'sources',
-        nargs='+',
-        type=input_name,
-        metavar='SOURCE',
-        help='Photographs, or folders of these, of ring targets that nobody described; or one '
-        'point list with rows CODEn, NUGGETn_A and NUGGETn_7, as V-STARS writes them.',
+    text = (
+        'Photographs, or folders of these, of ring targets that nobody described; or one '
+        'point list with rows CODEn, NUGGETn_A and NUGGETn_7, as V-STARS writes them.'
     )
-    parser.add_argument(
-        '-o',
-        '--output',
-        type=output_path,
-        required=True,
-        metavar='FILE',
-        help='Data file. For photographs, pictures of the words that were seen are beside it, in '
-        'FILE.png; a second family is FILE_2.',
+    add_input(parser, 'sources', 'SOURCE', text, nargs='+')
+    text = (
+        'Data file. For photographs, pictures of the words that were seen are beside it, in '
+        'FILE.png; a second family is FILE_2.'
     )
+    add_output(parser, '-o', 'FILE', text, required=True)
     parser.add_argument('--name', help='Name of the family. Default: the name of the data file.')
     rings = parser.add_argument_group('photographs of rings')
     for item in parameters(DetectorSettings):
         if item.name in _OF_DOTS:
             add_option(rings, item)
     points = parser.add_argument_group('point lists')
-    points.add_argument(
-        '--base',
-        type=input_name,
-        default='',
-        metavar='FILE',
-        help='Data file with the design in rough, for positions and codes that the points do not '
-        'show. Default: the family of GSI.',
+    text = (
+        'Data file with the design in rough, for positions and codes that the points do not '
+        'show. Default: the family of GSI.'
     )
+    add_input(points, '--base', 'FILE', text, default='')
     points.add_argument('--unit', default='mm', help='Unit of the coordinates. Default: mm.')
     points.add_argument(
         '--dot-radius',

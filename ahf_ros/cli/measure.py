@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ahf_ros.cli import say, tell
-from ahf_ros.cli.options import add_quiet, input_name, input_path, output_path, parsed_by
+from ahf_ros.cli.options import add_flag, add_input, add_output, add_quiet, input_path, parsed_by
 from ahf_ros.cli.tables import identifiers, print_table
 from ahf_ros.network.units import decimals
 
@@ -31,9 +31,7 @@ _Measured = tuple[list['Distance'], list['Deviation'], 'LengthTest | None']
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Give a parser the arguments of the command."""
-    parser.add_argument(
-        'network', type=input_path, metavar='NETWORK', help='Folder that ahf orient wrote.'
-    )
+    add_input(parser, 'network', 'NETWORK', 'Folder that ahf orient wrote.', type=input_path)
     parser.add_argument(
         '--distance',
         action='append',
@@ -44,12 +42,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         'nominal coordinates nor lengths are given.',
     )
     nominal = parser.add_argument_group('nominal coordinates')
-    nominal.add_argument(
-        '--nominal',
-        type=input_name,
-        metavar='POINTS.csv',
-        help='Compare the coordinates with nominal ones: ID, x, y, z.',
-    )
+    text = 'Compare the coordinates with nominal ones: ID, x, y, z.'
+    add_input(nominal, '--nominal', 'POINTS.csv', text)
     nominal.add_argument(
         '--align',
         choices=_ALIGNMENTS,
@@ -71,29 +65,20 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help='Weights of a best fit. Default: covariance, the inverse of the whole of it.',
     )
     lengths = parser.add_argument_group('calibrated lengths')
-    lengths.add_argument(
-        '--lengths',
-        type=input_name,
-        metavar='LENGTHS.csv',
-        help='Test calibrated lengths as VDI/VDE 2634-1 does: id_1, id_2, length, and perhaps '
-        'sigma and line.',
+    text = (
+        'Test calibrated lengths as VDI/VDE 2634-1 does: id_1, id_2, length, and perhaps '
+        'sigma and line.'
     )
+    add_input(lengths, '--lengths', 'LENGTHS.csv', text)
     lengths.add_argument(
         '--permissible',
         type=parsed_by(_permissible),
         metavar='A[,K[,B]]',
         help='Maximum permissible error of a length L: A + L/K, and not above B.',
     )
-    parser.add_argument(
-        '-o',
-        '--output',
-        type=output_path,
-        metavar='DIR',
-        help='Also write tables: distances.csv, deviations.csv, lengths.csv.',
-    )
-    parser.add_argument(
-        '--json', action='store_true', help='Print one JSON object on standard output.'
-    )
+    text = 'Also write tables: distances.csv, deviations.csv, lengths.csv.'
+    add_output(parser, '-o', 'DIR', text)
+    add_flag(parser, '--json', 'Print one JSON object on standard output.')
     add_quiet(parser)
 
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from ahf_ros.base.settings.parameter import Parameter
-from ahf_ros.cli.options import add_option, input_name, parsed_by
+from ahf_ros.cli.options import add_flag, add_input, add_option, parsed_by
 
 if TYPE_CHECKING:
     from ahf_ros.network.mounting import Mounted
@@ -21,13 +21,11 @@ _FIELD = 'targets'
 
 def add_mounting_arguments(group: argparse._ArgumentGroup) -> None:
     """Give a parser what is known of a robot or a rig."""
-    group.add_argument(
-        '--robot-poses',
-        type=input_name,
-        metavar='POSES.csv',
-        help='Poses of the hand in the frame of the base: image, x, y, z, and qx, qy, qz, qw or a '
-        'rotation vector rx, ry, rz in rad. Writes where the cameras are on the hand.',
+    text = (
+        'Poses of the hand in the frame of the base: image, x, y, z, and qx, qy, qz, qw or a '
+        'rotation vector rx, ry, rz in rad. Writes where the cameras are on the hand.'
     )
+    add_input(group, '--robot-poses', 'POSES.csv', text)
     group.add_argument(
         '--robot-unit',
         choices=('m', 'mm'),
@@ -38,11 +36,8 @@ def add_mounting_arguments(group: argparse._ArgumentGroup) -> None:
     add_option(group, Parameter('robot_position_sigma', 0.1, text, minimum=1e-6))
     text = 'Standard deviation of rotations of the hand, degrees.'
     add_option(group, Parameter('robot_rotation_sigma', 0.02, text, minimum=1e-6))
-    group.add_argument(
-        '--targets-on-hand',
-        action='store_true',
-        help='The hand moves the targets, before cameras that stand still.',
-    )
+    text = 'The hand moves the targets, before cameras that stand still.'
+    add_flag(group, '--targets-on-hand', text)
     group.add_argument(
         '--robot-frames',
         type=parsed_by(_frames),
@@ -50,13 +45,11 @@ def add_mounting_arguments(group: argparse._ArgumentGroup) -> None:
         metavar='BASE,HAND',
         help='Names of the frames that are written. Default: base,tool0.',
     )
-    group.add_argument(
-        '--stations',
-        type=input_name,
-        metavar='STATIONS.csv',
-        help='Photographs that cameras fixed to each other took at once: image, station. Writes '
-        'where the cameras are on one of them.',
+    text = (
+        'Photographs that cameras fixed to each other took at once: image, station. Writes '
+        'where the cameras are on one of them.'
     )
+    add_input(group, '--stations', 'STATIONS.csv', text)
 
 
 def _frames(text: str) -> tuple[str, str]:

@@ -44,12 +44,11 @@ def add_search_options(parser: argparse.ArgumentParser) -> None:
 
 def add_image_options(parser: Group) -> None:
     """Give a parser the options that say how and where image files are read."""
-    parser.add_argument(
-        '--upright',
-        action='store_true',
-        help='Turn images as their orientation says. Coordinates then count in the upright '
-        'image, otherwise in the pixels as they are stored.',
+    text = (
+        'Turn images as their orientation says. Coordinates then count in the upright '
+        'image, otherwise in the pixels as they are stored.'
     )
+    add_flag(parser, '--upright', text)
     text = (
         'Number of images or stacks that are identified at the same time, each in a process of '
         'its own; 0: one per processor core, and none for fewer than 4 images, which are faster '
@@ -72,26 +71,17 @@ def add_engine_options(parser: Group, jobs: Parameter) -> None:
 
 def add_output_options(parser: Group) -> None:
     """Give a parser the options that say what is printed and drawn."""
-    parser.add_argument(
-        '--json', action='store_true', help='Print one JSON object per image on standard output.'
-    )
-    parser.add_argument(
-        '--overlay',
-        type=output_path,
-        metavar='DIR',
-        help='Write each image with its targets marked to this folder, as NAME_overlay.png.',
-    )
+    add_flag(parser, '--json', 'Print one JSON object per image on standard output.')
+    text = 'Write each image with its targets marked to this folder, as NAME_overlay.png.'
+    add_output(parser, '--overlay', 'DIR', text)
     add_quiet(parser)
 
 
 def add_registration_options(parser: Group, without: Collection[str] = ()) -> None:
     """Give a parser the options of a registration, but for some of those of clouds."""
     add_options(parser, RegistrationSettings)
-    parser.add_argument(
-        '--adjust',
-        action='store_true',
-        help='Adjust all scans and targets jointly, which closes a chain of scans.',
-    )
+    text = 'Adjust all scans and targets jointly, which closes a chain of scans.'
+    add_flag(parser, '--adjust', text)
     for item in parameters(CloudSettings):
         if item.name in (*without, 'cloud'):
             parser.set_defaults(**{item.name: item.default})
@@ -101,9 +91,23 @@ def add_registration_options(parser: Group, without: Collection[str] = ()) -> No
 
 def add_quiet(parser: Group) -> None:
     """Give a parser the option that leaves problems only."""
-    parser.add_argument(
-        '--quiet', action='store_true', help='Print nothing on standard error but problems.'
-    )
+    add_flag(parser, '--quiet', 'Print nothing on standard error but problems.')
+
+
+def add_flag(parser: Group, name: str, text: str) -> None:
+    """Give a parser an option without a value, whose help is a text."""
+    parser.add_argument(name, action='store_true', help=text)
+
+
+def add_input(parser: Group, name: str, metavar: str, text: str, **more: Any) -> None:
+    """Give a parser an argument that names a file or folder to read, which no output replaces."""
+    parser.add_argument(name, metavar=metavar, help=text, **({'type': input_name} | more))
+
+
+def add_output(parser: Group, name: str, metavar: str, text: str, **more: Any) -> None:
+    """Give a parser an argument that names a file or folder to write; -o is --output as well."""
+    names = ('-o', '--output') if name == '-o' else (name,)
+    parser.add_argument(*names, type=output_path, metavar=metavar, help=text, **more)
 
 
 def add_options(parser: Group, settings: type) -> None:

@@ -26,11 +26,12 @@ from ahf_ros.cli.mounting import (
     print_mounting,
 )
 from ahf_ros.cli.options import (
+    add_flag,
+    add_input,
     add_option,
+    add_output,
     add_quiet,
-    input_name,
     input_path,
-    output_path,
     parsed_by,
 )
 from ahf_ros.network.export.formats import NETWORK_FORMATS, parsed_export
@@ -53,16 +54,12 @@ _LENGTH = re.compile(r'(?P<number>[0-9.]+(e[+-]?[0-9]+)?) *(?P<unit>px|mm)?', re
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Give a parser the arguments of the command."""
-    parser.add_argument(
-        'observations',
-        type=input_name,
-        metavar='RESULTS.jsonl',
-        help='Output of ahf identify --json, - is standard input; or a table of another program '
-        'that ends with .csv: image, id, x, y, and perhaps sigma, width and height.',
+    text = (
+        'Output of ahf identify --json, - is standard input; or a table of another program '
+        'that ends with .csv: image, id, x, y, and perhaps sigma, width and height.'
     )
-    parser.add_argument(
-        '-o', '--output', type=output_path, required=True, metavar='DIR', help='Folder to write.'
-    )
+    add_input(parser, 'observations', 'RESULTS.jsonl', text)
+    add_output(parser, '-o', 'DIR', 'Folder to write.', required=True)
     _add_camera_arguments(parser.add_argument_group('cameras'))
     _add_object_arguments(parser.add_argument_group('object'))
     _add_observation_arguments(parser.add_argument_group('observations'))
@@ -86,20 +83,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_camera_arguments(group: argparse._ArgumentGroup) -> None:
-    group.add_argument(
-        '--calibration',
-        type=input_name,
-        action='append',
-        default=[],
-        metavar='CAMERA.yaml',
-        help='Calibration of a camera, as ROS (camera_info), OpenCV or Kalibr write it. '
-        'Repeatable.',
-    )
-    group.add_argument(
-        '--adjust-calibration',
-        action='store_true',
-        help='Adjust given calibrations, too; without this they are kept as they are.',
-    )
+    text = 'Calibration of a camera, as ROS (camera_info), OpenCV or Kalibr write it. Repeatable.'
+    add_input(group, '--calibration', 'CAMERA.yaml', text, action='append', default=[])
+    text = 'Adjust given calibrations, too; without this they are kept as they are.'
+    add_flag(group, '--adjust-calibration', text)
     group.add_argument(
         '--focal-length',
         type=parsed_by(_focal_length),
@@ -107,43 +94,28 @@ def _add_camera_arguments(group: argparse._ArgumentGroup) -> None:
         help='Start value of the focal length: 3200px, or 35mm as its equivalent on film, by the '
         'diagonal. Without it, Exif data are used, and nothing where there are none.',
     )
-    group.add_argument(
-        '--fisheye',
-        action='store_true',
-        help='Lenses are equidistant fisheye ones, after Kannala and Brandt. Without this, they '
-        "are taken for such where Brown's model does not describe the border of the images.",
+    text = (
+        'Lenses are equidistant fisheye ones, after Kannala and Brandt. Without this, they '
+        "are taken for such where Brown's model does not describe the border of the images."
     )
-    group.add_argument(
-        '--cameras',
-        type=input_name,
-        metavar='CAMERAS.csv',
-        help='Which camera took which photograph: image, camera. Without it, photographs of one '
-        'size, and one camera and focal length in their Exif data, are of one camera.',
+    add_flag(group, '--fisheye', text)
+    text = (
+        'Which camera took which photograph: image, camera. Without it, photographs of one '
+        'size, and one camera and focal length in their Exif data, are of one camera.'
     )
-    group.add_argument(
-        '--images',
-        type=input_path,
-        action='append',
-        default=[],
-        metavar='DIR',
-        help='Folder that the photographs have moved to; their Exif data are read. Repeatable.',
-    )
+    add_input(group, '--cameras', 'CAMERAS.csv', text)
+    text = 'Folder that the photographs have moved to; their Exif data are read. Repeatable.'
+    add_input(group, '--images', 'DIR', text, type=input_path, action='append', default=[])
 
 
 def _add_object_arguments(group: argparse._ArgumentGroup) -> None:
-    group.add_argument(
-        '--scale-bars',
-        type=input_name,
-        metavar='BARS.csv',
-        help='Known distances: id_1, id_2, length, sigma, and perhaps role, control or check.',
+    text = 'Known distances: id_1, id_2, length, sigma, and perhaps role, control or check.'
+    add_input(group, '--scale-bars', 'BARS.csv', text)
+    text = (
+        'Known coordinates: id, x, y, z, and perhaps sigma_x, sigma_y, sigma_z or '
+        'covariance_xx to covariance_zz, and role, control or check.'
     )
-    group.add_argument(
-        '--control',
-        type=input_name,
-        metavar='POINTS.csv',
-        help='Known coordinates: id, x, y, z, and perhaps sigma_x, sigma_y, sigma_z or '
-        'covariance_xx to covariance_zz, and role, control or check.',
-    )
+    add_input(group, '--control', 'POINTS.csv', text)
     text = 'Standard deviation of control points where the table has none; 0 fixes them.'
     add_option(group, Parameter('control_sigma', 0.0, text, minimum=0.0))
     add_option(group, Parameter('unit', 'mm', 'Unit of scale bars and control points.'))
@@ -156,12 +128,11 @@ def _add_object_arguments(group: argparse._ArgumentGroup) -> None:
         'control points, else inner.',
     )
 
-    group.add_argument(
-        '--keep-suspects',
-        action='store_true',
-        help='Use scale bars and control points that contradict the photographs all the same. '
-        'Without this they are named and left out.',
+    text = (
+        'Use scale bars and control points that contradict the photographs all the same. '
+        'Without this they are named and left out.'
     )
+    add_flag(group, '--keep-suspects', text)
 
 
 def _add_observation_arguments(group: argparse._ArgumentGroup) -> None:

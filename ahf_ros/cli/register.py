@@ -13,12 +13,13 @@ from typing import TYPE_CHECKING
 from ahf_ros.base.opening import parsing
 from ahf_ros.cli import say, tell
 from ahf_ros.cli.options import (
+    add_input,
+    add_output,
     add_quiet,
     add_registration_options,
     add_search_options,
     add_target_options,
     input_path,
-    output_path,
     settings_from,
 )
 from ahf_ros.clouds.cloud_settings import CloudSettings
@@ -35,22 +36,16 @@ _CLOUDS = ('.ply', '.pcd')
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Give a parser the arguments of the command."""
-    parser.add_argument(
-        'folder',
-        type=input_path,
-        metavar='FOLDER',
-        help='Folder of organised clouds, PLY or PCD in metres, one point per pixel of an image '
-        'of the same name.',
+    text = (
+        'Folder of organised clouds, PLY or PCD in metres, one point per pixel of an image '
+        'of the same name.'
     )
-    parser.add_argument(
-        '-o',
-        '--output',
-        type=output_path,
-        required=True,
-        metavar='DIR',
-        help='Write clouds in the frame, transforms and targets to this folder, as the service '
-        '~/save of the node registration does.',
+    add_input(parser, 'folder', 'FOLDER', text, type=input_path)
+    text = (
+        'Write clouds in the frame, transforms and targets to this folder, as the service '
+        '~/save of the node registration does.'
     )
+    add_output(parser, '-o', 'DIR', text, required=True)
     add_registration_options(parser, without=('cloud_tolerance',))
     add_quiet(parser)
     add_target_options(parser)

@@ -11,7 +11,7 @@ from ahf_ros.base.settings.nested import flat_parameters
 from ahf_ros.base.settings.parameter import Parameter
 from ahf_ros.base.target import TrueTarget
 from ahf_ros.cli import say, tell
-from ahf_ros.cli.options import add_option, output_path, settings_from
+from ahf_ros.cli.options import add_option, add_output, settings_from
 from ahf_ros.files.image_files import write_image
 from ahf_ros.files.truth_files import read_truth, write_truth
 from ahf_ros.scenes.bent.picture import BentRendering, render_bent
@@ -47,13 +47,11 @@ class _Picture(NamedTuple):
 
 def add_arguments(parser: ArgumentParser) -> None:
     """Give a parser the arguments of the command."""
-    parser.add_argument(
-        'folder',
-        type=output_path,
-        metavar='DIR',
-        help='Folder for LIGHT_AMBIENT_SEED.png, or LIGHT_AMBIENT_SEED_PHASE.png with several '
-        'phases, and truth.csv; created if it does not exist.',
+    text = (
+        'Folder for LIGHT_AMBIENT_SEED.png, or LIGHT_AMBIENT_SEED_PHASE.png with several '
+        'phases, and truth.csv; created if it does not exist.'
     )
+    add_output(parser, 'folder', 'DIR', text)
     text = 'Number of images for each light, with consecutive seeds.'
     add_option(parser, Parameter('count', 1, text, minimum=1))
     choice = Parameter(

@@ -8,11 +8,11 @@ from ahf_ros.base.text import counted
 from ahf_ros.cli import say, tell
 from ahf_ros.cli.engines import progress_bar
 from ahf_ros.cli.options import (
+    add_input,
     add_options,
+    add_output,
     add_quiet,
-    input_name,
     input_path,
-    output_path,
     settings_from,
 )
 from ahf_ros.files.truth_files import read_truth
@@ -22,35 +22,13 @@ from ahf_ros.views.report.results import read_results
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Give a parser the arguments of the command."""
-    parser.add_argument(
-        'results',
-        nargs='+',
-        type=input_name,
-        metavar='RESULTS',
-        help='Files of JSON lines as ahf identify --json prints them, and folders of such files.',
-    )
-    parser.add_argument(
-        '-o',
-        '--output',
-        type=output_path,
-        required=True,
-        metavar='FILE.html',
-        help='Page to write.',
-    )
-    parser.add_argument(
-        '--images',
-        type=input_path,
-        action='append',
-        default=[],
-        metavar='DIR',
-        help='Folder that the images have moved to. Repeatable.',
-    )
-    parser.add_argument(
-        '--truth',
-        type=input_name,
-        metavar='TRUTH.csv',
-        help='What the images show, with the columns image, id, x, y[, confirmed].',
-    )
+    text = 'Files of JSON lines as ahf identify --json prints them, and folders of such files.'
+    add_input(parser, 'results', 'RESULTS', text, nargs='+')
+    add_output(parser, '-o', 'FILE.html', 'Page to write.', required=True)
+    text = 'Folder that the images have moved to. Repeatable.'
+    add_input(parser, '--images', 'DIR', text, type=input_path, action='append', default=[])
+    text = 'What the images show, with the columns image, id, x, y[, confirmed].'
+    add_input(parser, '--truth', 'TRUTH.csv', text)
     add_quiet(parser)
     add_options(parser, ReportSettings)
 

@@ -5,7 +5,7 @@ import argparse
 from ahf_ros.base.text import counted
 from ahf_ros.base.writing import write_files, write_whole
 from ahf_ros.cli import say, tell
-from ahf_ros.cli.options import add_options, output_path, settings_from
+from ahf_ros.cli.options import add_options, add_output, settings_from
 from ahf_ros.prints.printing.files import geometry_text, sheet_files
 from ahf_ros.prints.printing.settings import SheetSettings
 from ahf_ros.prints.printing.sheets import Sheets
@@ -13,20 +13,10 @@ from ahf_ros.prints.printing.sheets import Sheets
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Give a parser the arguments of the command."""
-    parser.add_argument(
-        '-o',
-        '--output',
-        type=output_path,
-        required=True,
-        metavar='FILE',
-        help='Sheet to write, .pdf or .svg. Several pages of SVG are FILE_1.svg and so on.',
-    )
-    parser.add_argument(
-        '--geometry',
-        type=output_path,
-        metavar='FILE.json',
-        help='Write ID, page and centre of each target and the radii, in mm.',
-    )
+    text = 'Sheet to write, .pdf or .svg. Several pages of SVG are FILE_1.svg and so on.'
+    add_output(parser, '-o', 'FILE', text, required=True)
+    text = 'Write ID, page and centre of each target and the radii, in mm.'
+    add_output(parser, '--geometry', 'FILE.json', text)
     add_options(parser, SheetSettings)
 
 

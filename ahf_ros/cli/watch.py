@@ -15,13 +15,15 @@ from ahf_ros.cli import tell
 from ahf_ros.cli.engines import create_engine, shared_settings
 from ahf_ros.cli.identify import check_settings, image_paths, image_task, print_outcome
 from ahf_ros.cli.options import (
+    add_flag,
     add_image_options,
+    add_input,
     add_option,
+    add_output,
     add_output_options,
     add_search_options,
     add_target_options,
     input_path,
-    output_path,
     settings_from,
 )
 from ahf_ros.files.files import RESULTS_FILE
@@ -31,18 +33,13 @@ from ahf_ros.identification.session_settings import IdentificationSettings
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Give a parser the arguments of the command."""
-    parser.add_argument('folder', type=input_path, metavar='FOLDER', help='Where images arrive.')
-    parser.add_argument(
-        '--output',
-        type=output_path,
-        required=True,
-        metavar='DIR',
-        help=f'Write results to {RESULTS_FILE} in this folder. What is there already is not '
-        'identified again unless settings or the file have changed.',
+    add_input(parser, 'folder', 'FOLDER', 'Where images arrive.', type=input_path)
+    text = (
+        f'Write results to {RESULTS_FILE} in this folder. What is there already is not '
+        'identified again unless settings or the file have changed.'
     )
-    parser.add_argument(
-        '--recursive', action='store_true', help='Look at the folders in the folder, too.'
-    )
+    add_output(parser, '--output', 'DIR', text, required=True)
+    add_flag(parser, '--recursive', 'Look at the folders in the folder, too.')
     text = (
         'Time for which size and time of change of a file have to stay the same before it is '
         'read, s.'
