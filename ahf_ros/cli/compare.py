@@ -15,10 +15,10 @@ from ahf_ros.cli.options import (
     add_flag,
     add_input,
     add_option,
+    add_parsed,
     add_quiet,
     input_path,
     output_path,
-    parsed_by,
 )
 from ahf_ros.cli.tables import identifiers, print_table
 from ahf_ros.network.units import decimals
@@ -33,24 +33,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Give a parser the arguments of the command."""
     add_input(parser, 'first', 'EPOCH1', 'Folder that ahf orient wrote.', type=input_path)
     add_input(parser, 'second', 'EPOCH2', 'The same, of the later epoch.', type=input_path)
-    parser.add_argument(
-        '-o',
-        '--output',
-        action='append',
-        default=[],
-        type=parsed_by(_output),
-        metavar='FILE',
-        help='Also write the movements: as a table, FILE.csv, or as a picture, FILE.svg. '
-        'Repeatable.',
+    text = 'Also write the movements: as a table, FILE.csv, or as a picture, FILE.svg. Repeatable.'
+    add_parsed(parser, '-o', 'FILE', text, _output, action='append', default=[])
+    text = (
+        'Targets that may have stood still, three or more, and more than half of them did. '
+        'Default: all that are in both epochs.'
     )
-    parser.add_argument(
-        '--stable',
-        type=parsed_by(identifiers),
-        default=(),
-        metavar='ID,ID,...',
-        help='Targets that may have stood still, three or more, and more than half of them did. '
-        'Default: all that are in both epochs.',
-    )
+    add_parsed(parser, '--stable', 'ID,ID,...', text, identifiers, default=())
     parser.add_argument(
         '--scale',
         choices=('fixed', 'free'),

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from ahf_ros.base.settings.parameter import Parameter
 from ahf_ros.base.text import counted
 from ahf_ros.cli import say, tell
-from ahf_ros.cli.options import Group, add_input, add_option, parsed_by
+from ahf_ros.cli.options import Group, add_input, add_option, add_parsed
 from ahf_ros.network.export.formats import FORMATS, Export
 
 if TYPE_CHECKING:
@@ -25,26 +25,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Give a parser the arguments of the command."""
     text = 'One JSON object per image; - is standard input.'
     add_input(parser, 'results', 'RESULTS.jsonl', text)
-    parser.add_argument(
-        'export',
-        nargs='+',
-        type=parsed_by(Export.parsed),
-        metavar='FORMAT=DIR',
-        help=f'Write the results {_FOLDER}',
-    )
+    text = f'Write the results {_FOLDER}'
+    add_parsed(parser, 'export', 'FORMAT=DIR', text, Export.parsed, nargs='+')
     _add_control_arguments(parser)
 
 
 def add_export_arguments(parser: Group) -> None:
     """Give another command, or a group of it, the options that export what it identifies."""
-    parser.add_argument(
-        '--export',
-        action='append',
-        default=[],
-        type=parsed_by(Export.parsed),
-        metavar='FORMAT=DIR',
-        help=f'Also write the results, once all images are identified, {_FOLDER} Repeatable.',
-    )
+    text = f'Also write the results, once all images are identified, {_FOLDER} Repeatable.'
+    add_parsed(parser, '--export', 'FORMAT=DIR', text, Export.parsed, action='append', default=[])
     _add_control_arguments(parser)
 
 

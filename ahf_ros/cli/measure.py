@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ahf_ros.cli import say, tell
-from ahf_ros.cli.options import add_flag, add_input, add_output, add_quiet, input_path, parsed_by
+from ahf_ros.cli.options import add_flag, add_input, add_output, add_parsed, add_quiet, input_path
 from ahf_ros.cli.tables import identifiers, print_table
 from ahf_ros.network.units import decimals
 
@@ -32,15 +32,11 @@ _Measured = tuple[list['Distance'], list['Deviation'], 'LengthTest | None']
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Give a parser the arguments of the command."""
     add_input(parser, 'network', 'NETWORK', 'Folder that ahf orient wrote.', type=input_path)
-    parser.add_argument(
-        '--distance',
-        action='append',
-        default=[],
-        type=parsed_by(_pair),
-        metavar='ID,ID',
-        help='Measure the distance of two targets. Repeatable. Default: all distances, if neither '
-        'nominal coordinates nor lengths are given.',
+    text = (
+        'Measure the distance of two targets. Repeatable. Default: all distances, if neither '
+        'nominal coordinates nor lengths are given.'
     )
+    add_parsed(parser, '--distance', 'ID,ID', text, _pair, action='append', default=[])
     nominal = parser.add_argument_group('nominal coordinates')
     text = 'Compare the coordinates with nominal ones: ID, x, y, z.'
     add_input(nominal, '--nominal', 'POINTS.csv', text)
@@ -50,15 +46,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help='How: best-fit, rigid; similarity, with a scale; 3-2-1; or none, if both are in one '
         'frame. Default: best-fit, or similarity where the network has no scale.',
     )
-    nominal.add_argument(
-        '--align-on',
-        type=parsed_by(identifiers),
-        default=(),
-        metavar='ID,ID,...',
-        help='Targets of the alignment. For 3-2-1 these are three across z, two across y, one '
+    text = (
+        'Targets of the alignment. For 3-2-1 these are three across z, two across y, one '
         'along x; or only three: a plane, the first two a line, the first one a point. '
-        'Default: all.',
+        'Default: all.'
     )
+    add_parsed(nominal, '--align-on', 'ID,ID,...', text, identifiers, default=())
     nominal.add_argument(
         '--weights',
         choices=('covariance', 'equal'),
@@ -70,12 +63,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         'sigma and line.'
     )
     add_input(lengths, '--lengths', 'LENGTHS.csv', text)
-    lengths.add_argument(
-        '--permissible',
-        type=parsed_by(_permissible),
-        metavar='A[,K[,B]]',
-        help='Maximum permissible error of a length L: A + L/K, and not above B.',
-    )
+    text = 'Maximum permissible error of a length L: A + L/K, and not above B.'
+    add_parsed(lengths, '--permissible', 'A[,K[,B]]', text, _permissible)
     text = 'Also write tables: distances.csv, deviations.csv, lengths.csv.'
     add_output(parser, '-o', 'DIR', text)
     add_flag(parser, '--json', 'Print one JSON object on standard output.')

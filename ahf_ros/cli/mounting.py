@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from ahf_ros.base.settings.parameter import Parameter
-from ahf_ros.cli.options import add_flag, add_input, add_option, parsed_by
+from ahf_ros.cli.options import add_flag, add_input, add_option, add_parsed
 
 if TYPE_CHECKING:
     from ahf_ros.network.mounting import Mounted
@@ -38,13 +38,8 @@ def add_mounting_arguments(group: argparse._ArgumentGroup) -> None:
     add_option(group, Parameter('robot_rotation_sigma', 0.02, text, minimum=1e-6))
     text = 'The hand moves the targets, before cameras that stand still.'
     add_flag(group, '--targets-on-hand', text)
-    group.add_argument(
-        '--robot-frames',
-        type=parsed_by(_frames),
-        default=('base', 'tool0'),
-        metavar='BASE,HAND',
-        help='Names of the frames that are written. Default: base,tool0.',
-    )
+    text = 'Names of the frames that are written. Default: base,tool0.'
+    add_parsed(group, '--robot-frames', 'BASE,HAND', text, _frames, default=('base', 'tool0'))
     text = (
         'Photographs that cameras fixed to each other took at once: image, station. Writes '
         'where the cameras are on one of them.'

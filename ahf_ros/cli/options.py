@@ -106,8 +106,20 @@ def add_input(parser: Group, name: str, metavar: str, text: str, **more: Any) ->
 
 def add_output(parser: Group, name: str, metavar: str, text: str, **more: Any) -> None:
     """Give a parser an argument that names a file or folder to write; -o is --output as well."""
-    names = ('-o', '--output') if name == '-o' else (name,)
-    parser.add_argument(*names, type=output_path, metavar=metavar, help=text, **more)
+    more |= {'type': output_path, 'metavar': metavar, 'help': text}
+    parser.add_argument(*_names(name), **more)
+
+
+def add_parsed(
+    parser: Group, name: str, metavar: str, text: str, parse: Callable[[str], Any], **more: Any
+) -> None:
+    """Give a parser an argument that a function reads, whose ValueErrors are for users."""
+    more |= {'type': parsed_by(parse), 'metavar': metavar, 'help': text}
+    parser.add_argument(*_names(name), **more)
+
+
+def _names(name: str) -> tuple[str, ...]:
+    return ('-o', '--output') if name == '-o' else (name,)
 
 
 def add_options(parser: Group, settings: type) -> None:

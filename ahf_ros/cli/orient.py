@@ -30,9 +30,9 @@ from ahf_ros.cli.options import (
     add_input,
     add_option,
     add_output,
+    add_parsed,
     add_quiet,
     input_path,
-    parsed_by,
 )
 from ahf_ros.network.export.formats import NETWORK_FORMATS, parsed_export
 
@@ -64,15 +64,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     _add_object_arguments(parser.add_argument_group('object'))
     _add_observation_arguments(parser.add_argument_group('observations'))
     add_mounting_arguments(parser.add_argument_group('robots and rigs'))
-    parser.add_argument(
-        '--export',
-        action='append',
-        default=[],
-        type=parsed_by(partial(parsed_export, formats=NETWORK_FORMATS)),
-        metavar='FORMAT=DIR',
-        help='Also write cameras, poses and targets for other software: '
-        f'{", ".join(NETWORK_FORMATS)}. Repeatable.',
+    text = (
+        'Also write cameras, poses and targets for other software: '
+        f'{", ".join(NETWORK_FORMATS)}. Repeatable.'
     )
+    exported = partial(parsed_export, formats=NETWORK_FORMATS)
+    add_parsed(parser, '--export', 'FORMAT=DIR', text, exported, action='append', default=[])
     parser.add_argument(
         '--progress',
         action=argparse.BooleanOptionalAction,
@@ -87,13 +84,11 @@ def _add_camera_arguments(group: argparse._ArgumentGroup) -> None:
     add_input(group, '--calibration', 'CAMERA.yaml', text, action='append', default=[])
     text = 'Adjust given calibrations, too; without this they are kept as they are.'
     add_flag(group, '--adjust-calibration', text)
-    group.add_argument(
-        '--focal-length',
-        type=parsed_by(_focal_length),
-        metavar='LENGTH',
-        help='Start value of the focal length: 3200px, or 35mm as its equivalent on film, by the '
-        'diagonal. Without it, Exif data are used, and nothing where there are none.',
+    text = (
+        'Start value of the focal length: 3200px, or 35mm as its equivalent on film, by the '
+        'diagonal. Without it, Exif data are used, and nothing where there are none.'
     )
+    add_parsed(group, '--focal-length', 'LENGTH', text, _focal_length)
     text = (
         'Lenses are equidistant fisheye ones, after Kannala and Brandt. Without this, they '
         "are taken for such where Brown's model does not describe the border of the images."
@@ -119,14 +114,12 @@ def _add_object_arguments(group: argparse._ArgumentGroup) -> None:
     text = 'Standard deviation of control points where the table has none; 0 fixes them.'
     add_option(group, Parameter('control_sigma', 0.0, text, minimum=0.0))
     add_option(group, Parameter('unit', 'mm', 'Unit of scale bars and control points.'))
-    group.add_argument(
-        '--datum',
-        type=parsed_by(_datum),
-        metavar='DATUM',
-        help='Frame of the coordinates: inner (constraints on all targets) or inner:ID,ID,...; '
+    text = (
+        'Frame of the coordinates: inner (constraints on all targets) or inner:ID,ID,...; '
         'control; fixed:ID,ID,ID (origin, x axis, plane z = 0). Default: control if there are '
-        'control points, else inner.',
+        'control points, else inner.'
     )
+    add_parsed(group, '--datum', 'DATUM', text, _datum)
 
     text = (
         'Use scale bars and control points that contradict the photographs all the same. '
