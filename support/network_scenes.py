@@ -55,10 +55,7 @@ def simulate(
     rotations = np.stack([_towards(*view) for view in zip(positions, aims, rolls, strict=True)])
     photograph, point = np.divmod(np.arange(field.photographs * field.targets), field.targets)
     xy = project(
-        lenses[camera_of[photograph]],
-        rotations[photograph],
-        positions[photograph],
-        points[point],
+        lenses[camera_of[photograph]], rotations[photograph], positions[photograph], points[point]
     )
     inside = ((xy > 0) & (xy < [WIDTH, HEIGHT])).all(axis=1)
     order = np.where(inside, random.random(len(xy)), 2).reshape(field.photographs, -1)

@@ -6,13 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ahf_ros.network.camera import pinhole, project
-from ahf_ros.network.network import (
-    CameraView,
-    FloatArray,
-    IntArray,
-    Network,
-    Observations,
-)
+from ahf_ros.network.network import CameraView, FloatArray, IntArray, Network, Observations
 
 WIDTH, HEIGHT = 3000, 2000
 NOISE = 0.05

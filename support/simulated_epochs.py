@@ -9,13 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ahf_ros.network.adjustment import adjust
-from ahf_ros.network.camera import (
-    PARAMETERS,
-    linearise,
-    pinhole,
-    project,
-    rotation_matrices,
-)
+from ahf_ros.network.camera import PARAMETERS, linearise, pinhole, project, rotation_matrices
 from ahf_ros.network.datum import movements, s_transform
 from ahf_ros.network.network import FloatArray, ScaleBar
 from ahf_ros.network.points import MeasuredPoints

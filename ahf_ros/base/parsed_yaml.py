@@ -139,8 +139,7 @@ class _Tree:
         value, size = self._known.get(event.anchor, (None, 0))
         if not self._aliases or not size:
             self.refuse(
-                line,
-                'an alias stands for this part elsewhere, accepted are data without aliases',
+                line, 'an alias stands for this part elsewhere, accepted are data without aliases'
             )
         self._counted(size, line)
         return value

@@ -128,10 +128,7 @@ def _samples(scene: _Scene, top: int, bottom: int, margin: int) -> np.ndarray:
         above, below = max(printed.window[1], top), min(printed.window[3], bottom)
         if first >= last or above >= below:
             continue
-        inside = (
-            slice(above - top, below - top + 2),
-            slice(first - left, last - left + 2),
-        )
+        inside = (slice(above - top, below - top + 2), slice(first - left, last - left + 2))
         _add_sheet(
             seen[
                 (above - top) * _SAMPLES : (below - top) * _SAMPLES,

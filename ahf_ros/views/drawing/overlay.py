@@ -156,10 +156,7 @@ def draw(image: np.ndarray, identification: Identification) -> np.ndarray:
     (60, 80, 3)
     """
     return overlay(
-        image,
-        identification.targets,
-        title=summary(identification),
-        prints=identification.prints,
+        image, identification.targets, title=summary(identification), prints=identification.prints
     )
 
 
