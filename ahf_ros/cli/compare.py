@@ -152,6 +152,7 @@ def _rows(found: Comparison) -> Iterator[list[object]]:
 
 
 def _record(found: Comparison) -> dict[str, Any]:
+    figures = 'length', 'sigma', 'statistic', 'probability', 'in_datum', 'moved'
     return {
         'congruent': found.congruent,
         'moved': list(found.moved),
@@ -166,12 +167,7 @@ def _record(found: Comparison) -> dict[str, Any]:
                 'place': it.place.tolist(),
                 'movement': it.xyz.tolist(),
                 'covariance': it.covariance.tolist(),
-                'length': it.length,
-                'sigma': it.sigma,
-                'statistic': it.statistic,
-                'probability': it.probability,
-                'in_datum': it.in_datum,
-                'moved': it.moved,
+                **{name: getattr(it, name) for name in figures},
             }
             for it in found.movements
         ],

@@ -50,18 +50,7 @@ def run(options: argparse.Namespace) -> int:
 def _record(image: str | None, item: Score) -> dict[str, Any]:
     """Return the figures of an image as a JSON object; `image` is None for all images."""
     x, y, both = item.rmse or (None, None, None)
-    return {
-        'image': image,
-        'expected': item.expected,
-        'reported': item.reported,
-        'found': item.found,
-        'right': item.right,
-        'correctness': item.correctness,
-        'recall': item.recall,
-        'decoding': item.decoding,
-        'wrong': item.wrong,
-        'false_positives': item.false_positives,
-        'rmse_x': x,
-        'rmse_y': y,
-        'rmse_xy': both,
-    }
+    counts = 'expected', 'reported', 'found', 'right'
+    names = *counts, 'correctness', 'recall', 'decoding', 'wrong', 'false_positives'
+    figures = {name: getattr(item, name) for name in names}
+    return {'image': image, **figures, 'rmse_x': x, 'rmse_y': y, 'rmse_xy': both}
