@@ -60,6 +60,7 @@ FORMER = {
     'opening': 'base.opening',
     'options': 'base.options',
     'orientation': 'network',
+    'orientation.normals': 'network.image_points',
     'orientation.precision': 'network.least_squares',
     'parsed_yaml': 'base.parsed_yaml',
     'printing': 'prints.printing',

@@ -7,15 +7,15 @@ from numpy.typing import NDArray
 
 from ahf_ros.base.blas import one_blas_thread
 from ahf_ros.base.text import counted
-from ahf_ros.network import normals
+from ahf_ros.network import image_points
 from ahf_ros.network.calibration import undetermined, unlike_given, unlike_pixels
 from ahf_ros.network.camera import PARAMETERS, parameters_of
 from ahf_ros.network.datum import Datum
 from ahf_ros.network.deviations import failed_checks, said
+from ahf_ros.network.image_points import Layout
 from ahf_ros.network.knowledge import gathered, kind, knowledge
 from ahf_ros.network.least_squares import Knowledge, minimise
 from ahf_ros.network.network import FloatArray, IntArray, Network, check_network
-from ahf_ros.network.normals import Layout
 from ahf_ros.network.placing import placed
 from ahf_ros.network.progress import stage
 from ahf_ros.network.refinement import NEEDED, agreeing, free_parameters
@@ -147,7 +147,7 @@ class _Model:
         """Return the layout of the used observations."""
         control = {point.name for point in self.network.control if not point.check}
         known = np.isin(self.network.targets, list(control))
-        layout = normals.lay_out(
+        layout = image_points.lay_out(
             self.network,
             state,
             state.used,
@@ -173,7 +173,7 @@ class _Model:
         state, _ = minimise(layout, state, self.known(layout), 'cauchy')
         state = replace(state, used=agreeing(self.network, state, layout))
         layout = self.lay_out(state)
-        spread = max(1.0, normals.robust_spread(normals.whitened_lengths(layout, state)))
+        spread = max(1.0, image_points.robust_spread(image_points.whitened_lengths(layout, state)))
         return relocated(self.network, state, layout, CRITICAL * spread)
 
     def adjusted(self, state: NetworkState, datum: Datum) -> Adjusted:
@@ -236,7 +236,7 @@ def _solution(network: Network, result: Adjusted, warnings: tuple[str, ...]) -> 
     coordinates = np.flatnonzero(np.repeat(adjusted_points, 3))
     points[np.ix_(coordinates, coordinates)] = covariance[: len(coordinates), : len(coordinates)]
     residuals = np.full(network.observations.xy.shape, np.nan)
-    residuals[every.observations] = normals.residuals(every, result.state)
+    residuals[every.observations] = image_points.residuals(every, result.state)
     normalised = np.full(len(residuals), np.nan)
     normalised[every.observations] = result.lengths / np.sqrt(factor)
     warnings += undetermined(network, layout, result.state, covariance)

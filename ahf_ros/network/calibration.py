@@ -14,8 +14,8 @@ References
 import numpy as np
 
 from ahf_ros.network.camera import PARAMETERS, known_calibration, parameters_of
+from ahf_ros.network.image_points import Layout
 from ahf_ros.network.network import CameraView, FloatArray, IntArray, Network
-from ahf_ros.network.normals import Layout
 from ahf_ros.network.solution import NetworkState
 
 USUAL = {

@@ -15,9 +15,9 @@ import numpy as np
 
 from ahf_ros.network.calibration import usual
 from ahf_ros.network.datum import Datum, movements
+from ahf_ros.network.image_points import Layout
 from ahf_ros.network.least_squares import Conditions, Knowledge
 from ahf_ros.network.network import ControlPoint, FloatArray, IntArray, Network, ScaleBar
-from ahf_ros.network.normals import Layout
 from ahf_ros.network.solution import NetworkState
 
 _NO_VARIANCE = 1e-14  # of a direction, relative to the largest of the point

@@ -1,12 +1,18 @@
 """Damped Gauss-Newton iterations, with or without a robust loss [1]_, [2]_, and covariances.
 
+Targets are few and photographs many. Poses are eliminated in 6x6 blocks from the normal equations;
+the unknowns that stay, three coordinates a point and the free parameters of the cameras, make one
+dense matrix, whose inverse is the full covariance. What is eliminated costs a 6x6 factorisation a
+photograph, so that time grows linearly with them. The datum, and whatever is known without error,
+borders the reduced matrix.
+
 Covariances, of what is estimated and of the image points that are computed, come from the inverse
 of the reduced and bordered normal equations; none is conditioned on anything else being known
 [3]_.
 
 References
 ----------
-.. [1] Triggs et al., Bundle adjustment: a modern synthesis, 2000, sections 3 and 4.
+.. [1] Triggs et al., Bundle adjustment: a modern synthesis, 2000, sections 3, 4, 6 and 9.
 .. [2] Nocedal & Wright, Numerical Optimization, 2006, 10.3 and 18.3.
 .. [3] Förstner & Wrobel, Photogrammetric Computer Vision, 2016, 4.2 and 15.3.
 """
@@ -19,9 +25,10 @@ from typing import Literal
 
 import numpy as np
 
-from ahf_ros.network import normals
-from ahf_ros.network.network import FloatArray
-from ahf_ros.network.normals import Design, Layout, Normals
+from ahf_ros.network import image_points
+from ahf_ros.network.camera import rotation_matrices
+from ahf_ros.network.image_points import Design, Layout
+from ahf_ros.network.network import FloatArray, IntArray
 from ahf_ros.network.progress import iteration
 from ahf_ros.network.solution import NetworkState
 
@@ -33,6 +40,44 @@ _CONVERGED = 1e-9  # decrease of the sum of weighted squares that a step promise
 _ROBUST_CONVERGED = 1e-2  # ... under a robust loss, which only prepares tests
 _ROUNDING = 1e-13  # ... relative to the sum
 _TUNING = 3.0  # standard deviations at which robust weights fall
+
+
+@dataclass(frozen=True)
+class Groups:
+    """Rows grouped by a label: `labels` (g,) in ascending order, and sums of each group."""
+
+    labels: IntArray
+    order: IntArray
+    starts: IntArray
+
+    @classmethod
+    def by(cls, labels: IntArray) -> Groups:
+        """Group rows by labels (m,)."""
+        order = np.argsort(labels, kind='stable')
+        unique, starts = np.unique(labels[order], return_index=True)
+        return cls(unique, order, starts)
+
+    def sum(self, rows: FloatArray) -> FloatArray:
+        """Return the sums (g, ...) of rows (m, ...)."""
+        return np.add.reduceat(rows[self.order], self.starts, axis=0)
+
+
+@dataclass(frozen=True)
+class Normals:
+    """Normal equations: (n, 6, 6) of poses, (n, 6, u) mixed, (u, u) of the rest, right sides."""
+
+    pose: FloatArray
+    mixed: FloatArray
+    rest: FloatArray
+    pose_right: FloatArray
+    rest_right: FloatArray
+
+    def damped(self, damping: float) -> Normals:
+        """Return the normal equations with their diagonals enlarged, after Marquardt."""
+        pose, rest = self.pose.copy(), self.rest.copy()
+        pose[:, np.arange(6), np.arange(6)] *= 1 + damping
+        rest[np.diag_indices_from(rest)] *= 1 + damping
+        return replace(self, pose=pose, rest=rest)
 
 
 @dataclass(frozen=True)
@@ -98,25 +143,27 @@ def minimise(
     enough = _CONVERGED if loss == 'squares' else _ROBUST_CONVERGED
     for number in range(rounds):
         iteration(number + 1)
-        lengths = normals.whitened_lengths(layout, state)
-        spread = 1.0 if loss == 'squares' else max(1.0, normals.robust_spread(lengths))
+        lengths = image_points.whitened_lengths(layout, state)
+        spread = 1.0 if loss == 'squares' else max(1.0, image_points.robust_spread(lengths))
         conditions = knowledge(state)
         weights = _losses(lengths, spread, loss)[1]
-        equations = normals.assemble(layout, normals.linearise(layout, state), weights)
+        equations = assemble(layout, image_points.linearise(layout, state), weights)
         equations = conditions.added(equations)
         border, gaps = conditions.border()
         before = _losses(lengths, spread, loss)[0] + conditions.cost
         while True:
-            reduced = normals.reduce(equations.damped(damping))
-            poses, rest, multipliers = normals.solve(reduced, border, gaps)
+            reduced = reduce(equations.damped(damping))
+            poses, rest, multipliers = solve(reduced, border, gaps)
             promised = float(
                 (equations.pose_right * poses).sum() + equations.rest_right @ rest
             ) + float(2 * np.abs(multipliers) @ np.abs(gaps))
             if abs(promised) < enough * spread**2 + _ROUNDING * before:
-                return normals.changed(layout, state, poses, rest), True
-            trial = normals.changed(layout, state, poses, rest)
+                return changed(layout, state, poses, rest), True
+            trial = changed(layout, state, poses, rest)
             known = knowledge(trial)
-            after = _losses(normals.whitened_lengths(layout, trial), spread, loss)[0] + known.cost
+            after = (
+                _losses(image_points.whitened_lengths(layout, trial), spread, loss)[0] + known.cost
+            )
             penalty = 2 * np.abs(multipliers)  # of what has to hold exactly [2]_
             if after + penalty @ np.abs(known.border()[1]) < before + penalty @ np.abs(gaps):
                 state, damping = trial, max(damping / 10, np.finfo(float).eps)
@@ -138,11 +185,11 @@ class Precision:
 
 def precision(layout: Layout, state: NetworkState, knowledge: Knowledge) -> Precision:
     """Return the covariances at converged values, in the datum that is known, for unit weights."""
-    equations = normals.assemble(layout, normals.linearise(layout, state), np.ones(len(layout.xy)))
+    equations = assemble(layout, image_points.linearise(layout, state), np.ones(len(layout.xy)))
     conditions = knowledge(state)
-    reduced, border = normals.reduce(conditions.added(equations)), conditions.border()[0]
+    reduced, border = reduce(conditions.added(equations)), conditions.border()[0]
     unknowns = len(reduced.matrix)
-    inverse = np.linalg.inv(normals.bordered(reduced, border)[0])[:unknowns, :unknowns]
+    inverse = np.linalg.inv(bordered(reduced, border)[0])[:unknowns, :unknowns]
     rest = reduced.scale[:, None] * (inverse + inverse.T) / 2 * reduced.scale
     held = border[:, (border != 0).sum(axis=0) == 1].any(axis=1)
     rest[held], rest[:, held] = 0.0, 0.0  # exactly: rounding would make variances below zero
@@ -187,3 +234,137 @@ def _losses(lengths: FloatArray, spread: float, loss: Loss) -> tuple[float, Floa
     unit = (_TUNING * spread) ** 2
     relative = squares / unit
     return float(unit * np.log1p(relative).sum()), 1 / (1 + relative)
+
+
+def assemble(layout: Layout, design: Design, weights: FloatArray) -> Normals:
+    """Return the normal equations of observation equations with further weights (m,)."""
+    root = np.sqrt(weights)[:, None, None]
+    pose, point, calibration = (
+        np.ascontiguousarray(root * part)
+        for part in (design.by_pose, design.by_point, design.by_calibration)
+    )
+    right = root * design.misclosure[:, :, None]
+    images = Groups.by(layout.photograph)
+    rays = Groups.by(layout.point)
+    count, unknowns = len(layout.photographs), layout.unknowns
+    coordinates = np.arange(3 * len(layout.points)).reshape(-1, 3)
+
+    mixed = np.zeros((count, 6, unknowns))
+    mixed[
+        layout.photograph[:, None, None],
+        np.arange(6)[:, None],
+        coordinates[layout.point][:, None, :],
+    ] = products(pose, point)
+    rest = np.zeros((unknowns, unknowns))
+    rest_right = np.zeros(unknowns)
+    rest[coordinates[:, :, None], coordinates[:, None, :]] = rays.sum(products(point, point))
+    rest_right[coordinates] = rays.sum(products(point, right)[:, :, 0])
+    columns = layout.columns
+    for index in np.flatnonzero(layout.free.any(axis=1)):
+        free = layout.free[index]
+        own = columns[index, free]
+        mine = layout.camera == index
+        part = calibration[mine][:, :, free]
+        of_images = Groups.by(layout.photograph[mine])
+        mixed[of_images.labels[:, None, None], np.arange(6)[:, None], own] = of_images.sum(
+            products(pose[mine], part)
+        )
+        of_points = Groups.by(layout.point[mine])
+        block = of_points.sum(products(point[mine], part)).reshape(-1, len(own))
+        rows = coordinates[of_points.labels].reshape(-1)
+        rest[rows[:, None], own] = block
+        rest[own[:, None], rows] = block.T
+        flat = part.reshape(-1, len(own))
+        rest[own[:, None], own] = flat.T @ flat
+        rest_right[own] = flat.T @ right[mine].reshape(-1)
+    return Normals(
+        images.sum(products(pose, pose)),
+        mixed,
+        rest,
+        images.sum(products(pose, right)[:, :, 0]),
+        rest_right,
+    )
+
+
+@dataclass(frozen=True)
+class Reduced:
+    """What remains without poses: their Cholesky factors, L^-1 of mixed blocks, and the rest."""
+
+    factor: FloatArray
+    half: FloatArray
+    half_right: FloatArray
+    matrix: FloatArray
+    right: FloatArray
+    scale: FloatArray
+    """(u,) by which rows and columns are multiplied before anything is solved or inverted."""
+
+
+def reduce(normals: Normals) -> Reduced:
+    """Eliminate the poses by their Schur complement."""
+    factor = np.asarray(np.linalg.cholesky(normals.pose), dtype=float)
+    half = np.linalg.solve(factor, normals.mixed)
+    half_right = np.linalg.solve(factor, normals.pose_right[:, :, None])[:, :, 0]
+    flat = half.reshape(-1, half.shape[2])
+    matrix = normals.rest - flat.T @ flat
+    least = np.finfo(float).eps * np.diag(normals.rest) + np.finfo(float).tiny
+    return Reduced(
+        factor,
+        half,
+        half_right,
+        matrix,
+        normals.rest_right - flat.T @ half_right.reshape(-1),
+        np.maximum(np.diag(matrix), least) ** -0.5,
+    )
+
+
+def solve(
+    reduced: Reduced, border: FloatArray, gap: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return changes of poses (n, 6), of the rest (u,), and multipliers (h,) of the border.
+
+    With the border's columns H (u, h), the changes x of the rest fulfil H'x = gap.
+    """
+    scale = reduced.scale
+    matrix, size = bordered(reduced, border)
+    changes = np.linalg.solve(matrix, np.concatenate([scale * reduced.right, gap / size]))
+    rest = scale * changes[: len(scale)]
+    left = reduced.half_right - reduced.half @ rest
+    poses = np.linalg.solve(reduced.factor.transpose(0, 2, 1), left[:, :, None])[:, :, 0]
+    return poses, rest, changes[len(scale) :] / size
+
+
+def changed(
+    layout: Layout, state: NetworkState, poses: FloatArray, rest: FloatArray
+) -> NetworkState:
+    """Return approximate values with changes of poses (n, 6) and of the rest (u,) added."""
+    calibrations, rotations = state.calibrations.copy(), state.rotations.copy()
+    positions, points = state.positions.copy(), state.points.copy()
+    calibrations[layout.free] += rest[layout.columns[layout.free]]
+    points[layout.points] += rest[: 3 * len(layout.points)].reshape(-1, 3)
+    positions[layout.photographs] += poses[:, :3]
+    rotations[layout.photographs] = rotation_matrices(poses[:, 3:]) @ rotations[layout.photographs]
+    return replace(
+        state, calibrations=calibrations, rotations=rotations, positions=positions, points=points
+    )
+
+
+def products(left: FloatArray, right: FloatArray) -> FloatArray:
+    """Return A'B (m, a, b) of rows' blocks (m, 2, a) and (m, 2, b)."""
+    return left[:, 0, :, None] * right[:, 0, None, :] + left[:, 1, :, None] * right[:, 1, None, :]
+
+
+def bordered(reduced: Reduced, border: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the scaled and bordered matrix, and the sizes (h,) that its border had.
+
+    Columns of the border that depend on each other are a LinAlgError: of the singular matrix that
+    they would make, rounding decides whether it can be solved.
+    """
+    scale = reduced.scale
+    columns = scale[:, None] * border
+    size = np.linalg.norm(columns, axis=0)
+    columns = columns / size
+    if columns.size and np.linalg.matrix_rank(columns) < len(size):
+        raise np.linalg.LinAlgError('columns of the border depend on each other')
+    empty = np.zeros((border.shape[1], border.shape[1]))
+    scaled = scale[:, None] * reduced.matrix * scale
+    return np.block([[scaled, columns], [columns.T, empty]]), size

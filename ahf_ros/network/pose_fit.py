@@ -19,8 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ahf_ros.network.camera import pinhole
+from ahf_ros.network.image_points import BEHIND, robust_spread
 from ahf_ros.network.network import FloatArray, IntArray
-from ahf_ros.network.normals import BEHIND, robust_spread
 from ahf_ros.network.planar import mirrored
 from ahf_ros.network.points import entries
 from ahf_ros.network.resection import Resection, resections

@@ -8,13 +8,13 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ahf_ros.network import normals
+from ahf_ros.network import image_points
 from ahf_ros.network.calibration import usual
 from ahf_ros.network.camera import PARAMETERS, parameters_of
 from ahf_ros.network.datum import movements
+from ahf_ros.network.image_points import Layout
 from ahf_ros.network.least_squares import Conditions, Knowledge, minimise
 from ahf_ros.network.network import Network
-from ahf_ros.network.normals import Layout
 from ahf_ros.network.solution import NetworkState
 
 _AGREES = 5.0  # standard deviations, or robust ones, of an observation that agrees
@@ -37,7 +37,7 @@ def refine(
 
     Raises `ValueError` if nothing is left that could be adjusted.
     """
-    layout = normals.lay_out(network, start, start.used, free_parameters(network, free))
+    layout = image_points.lay_out(network, start, start.used, free_parameters(network, free))
     if not len(layout.xy):
         raise ValueError('start: nothing to refine; ' + NEEDED)
     refined, _ = minimise(layout, start, usual_lens(network, layout), 'cauchy', rounds)
@@ -58,10 +58,12 @@ def free_parameters(network: Network, names: tuple[str, ...]) -> NDArray[np.bool
 def agreeing(network: Network, state: NetworkState, adjusted: Layout) -> NDArray[np.bool_]:
     """Return which observations (m,), adjusted or not, agree with the values."""
     everything = np.ones(len(network.observations.xy), dtype=bool)
-    every = normals.lay_out(network, state, everything, adjusted.free, backward=adjusted.backward)
-    lengths = normals.whitened_lengths(every, state)
+    every = image_points.lay_out(
+        network, state, everything, adjusted.free, backward=adjusted.backward
+    )
+    lengths = image_points.whitened_lengths(every, state)
     among = np.isin(every.observations, adjusted.observations)
-    spread = max(1.0, normals.robust_spread(lengths[among]))
+    spread = max(1.0, image_points.robust_spread(lengths[among]))
     used = np.zeros(len(network.observations.xy), dtype=bool)
     used[every.observations[lengths < _AGREES * spread]] = True
     return used

@@ -15,10 +15,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ahf_ros.network import camera, normals
+from ahf_ros.network import camera, image_points
+from ahf_ros.network.image_points import Layout
 from ahf_ros.network.least_squares import Knowledge, Precision, minimise, of_computed, precision
 from ahf_ros.network.network import FloatArray, Network, Rejection, rejected
-from ahf_ros.network.normals import Layout
 from ahf_ros.network.progress import stage
 from ahf_ros.network.solution import NetworkState
 from ahf_ros.network.testing import (
@@ -84,7 +84,7 @@ def _largest(
         return None
     points = _intersections(centres[pairs], towards[pairs])
     every = np.tile(points, (len(rows), 1))
-    lengths = normals.lengths_at(layout, state, np.repeat(rows, len(points)), every)
+    lengths = image_points.lengths_at(layout, state, np.repeat(rows, len(points)), every)
     met = lengths.reshape(len(rows), -1) < tolerance
     best = int(met.sum(axis=0).argmax())
     point, chosen = points[best], met[:, best]
@@ -92,7 +92,7 @@ def _largest(
         if chosen.sum() < 2:
             return None
         point = _intersections(centres[None, chosen], towards[None, chosen])[0]
-        again = normals.lengths_at(layout, state, rows, np.tile(point, (len(rows), 1)))
+        again = image_points.lengths_at(layout, state, rows, np.tile(point, (len(rows), 1)))
         chosen = again < tolerance
     return Place(point, rows[chosen]) if chosen.sum() > 1 else None
 
@@ -140,7 +140,7 @@ class Adjusted:
         """The variance of unit weight of what was measured, with its test."""
         measured = self.knowledge(self.state).measured
         known = ((measured.rows @ self.precision.rest) * measured.rows).sum(axis=1)
-        lengths = normals.whitened_lengths(self.layout, self.state)
+        lengths = image_points.whitened_lengths(self.layout, self.state)
         redundancy = (2 - self.share[self.used]).sum() + (1 - known / measured.variances).sum()
         return unit_weight(float((lengths**2).sum()) + measured.cost, round(redundancy))
 
@@ -158,9 +158,9 @@ def adjusted(
     knowledge = known(layout)
     state, converged = minimise(layout, state, knowledge)
     covariances = precision(layout, state, knowledge)
-    every = normals.extended(network, layout)
+    every = image_points.extended(network, layout)
     used = np.isin(every.observations, layout.observations)
-    design = normals.linearise(every, state)
+    design = image_points.linearise(every, state)
     computed = of_computed(every, design, covariances)
     lengths = normalised(every, state, design, computed, used)
     share = np.trace(computed, axis1=1, axis2=2)
@@ -206,7 +206,7 @@ def relocated(
     """
     everything = np.ones(len(network.observations.xy), dtype=bool)
     wider = replace(layout, points=np.arange(len(network.targets)))
-    every = normals.extended(network, wider)
+    every = image_points.extended(network, wider)
     points, used = state.points.copy(), state.used & everything
     agrees = state.used[every.observations]
     rays = np.bincount(every.point, minlength=len(points))
@@ -270,7 +270,7 @@ def _by_chance(every: Layout, state: NetworkState, place: Place, rows: NDArray[n
     free = 2 * len(place.rows) - 3
     targets = state.points[every.points[every.point[place.rows]]]
     here, there = (
-        float((normals.lengths_at(every, state, place.rows, points) ** 2).sum())
+        float((image_points.lengths_at(every, state, place.rows, points) ** 2).sum())
         for points in (targets, np.tile(place.point, (len(place.rows), 1)))
     )
     ratio = (here - there) / 3 / max(there / free, np.finfo(float).tiny)
@@ -282,7 +282,7 @@ def _other_target(every: Layout, state: NetworkState, row: int, tolerance: float
     """Return the index of another target whose image is where a row was measured, if any."""
     points = state.points[every.points]
     rows = np.full(len(points), row)
-    lengths = normals.lengths_at(every, state, rows, points)
+    lengths = image_points.lengths_at(every, state, rows, points)
     lengths[every.point[row]] = np.inf
     nearest = int(lengths.argmin())
     return int(every.points[nearest]) if lengths[nearest] < tolerance else None

@@ -21,8 +21,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ahf_ros.base.extras import need
+from ahf_ros.network.image_points import BEHIND, Design, Layout, whitened_lengths
 from ahf_ros.network.network import FloatArray
-from ahf_ros.network.normals import BEHIND, Design, Layout, whitened_lengths
 from ahf_ros.network.solution import NetworkState
 
 CRITICAL = 4.7

@@ -9,11 +9,11 @@ from itertools import combinations
 
 import numpy as np
 
-from ahf_ros.network import normals
+from ahf_ros.network import image_points
 from ahf_ros.network.camera import known_calibration, pinhole
+from ahf_ros.network.image_points import BEHIND
 from ahf_ros.network.least_squares import precision
 from ahf_ros.network.network import CameraView, FloatArray, IntArray, Network, part_of
-from ahf_ros.network.normals import BEHIND
 from ahf_ros.network.planar import mirrored
 from ahf_ros.network.refinement import free_parameters, refine, usual_lens
 from ahf_ros.network.relative import relative_orientations
@@ -359,7 +359,7 @@ def _misfit(lengths: FloatArray) -> float:
 def focal_sigma(network: Network, start: NetworkState, free: tuple[str, ...]) -> float:
     """Return the largest relative standard deviation of a free focal length, for unit weights."""
     mask = free_parameters(network, free)
-    layout = normals.lay_out(network, start, start.used, mask)
+    layout = image_points.lay_out(network, start, start.used, mask)
     focal = layout.columns[layout.free[:, 0], 0]
     if not len(focal):
         return 0.0 if len(layout.xy) else np.inf

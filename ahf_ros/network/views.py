@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ahf_ros.network import normals
+from ahf_ros.network import image_points
 from ahf_ros.network.camera import undistort
 from ahf_ros.network.network import FloatArray, IntArray, Network
 from ahf_ros.network.refinement import free_parameters
@@ -65,16 +65,16 @@ def lengths_of(network: Network, start: NetworkState) -> FloatArray:
     lengths = np.full(len(observed.xy), np.nan)
     lengths[known] = np.inf
     every = np.ones(len(known), dtype=bool)
-    layout = normals.lay_out(network, start, every, free_parameters(network, ()))
+    layout = image_points.lay_out(network, start, every, free_parameters(network, ()))
     if len(layout.xy):
-        lengths[layout.observations] = normals.whitened_lengths(layout, start)
+        lengths[layout.observations] = image_points.whitened_lengths(layout, start)
     return lengths
 
 
 def spread_of(lengths: FloatArray) -> float:
     """Return the robust spread of residuals in standard deviations, at least one."""
     known = lengths[~np.isnan(lengths)]
-    return max(1.0, normals.robust_spread(known)) if len(known) else np.inf
+    return max(1.0, image_points.robust_spread(known)) if len(known) else np.inf
 
 
 def largest_angles(network: Network, start: NetworkState) -> FloatArray:

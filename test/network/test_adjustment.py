@@ -8,7 +8,7 @@ from typing import Any, TypeAlias
 import numpy as np
 import pytest
 
-from ahf_ros.network import normals
+from ahf_ros.network import image_points
 from ahf_ros.network.adjustment import adjust
 from ahf_ros.network.camera import PARAMETERS, project
 from ahf_ros.network.datum import Datum, movements
@@ -76,8 +76,8 @@ def test_covariances_are_those_of_the_whole_inverse(scene: Scene) -> None:
     solution = adjust(network, start, release=('f',), test=False)
     numbers, poses = 3 * len(network.targets), len(network.photographs)
     free = np.isin(PARAMETERS, ['f'])[None]
-    layout = normals.lay_out(network, solution.state, solution.state.used, free)
-    design = normals.linearise(layout, solution.state)
+    layout = image_points.lay_out(network, solution.state, solution.state.used, free)
+    design = image_points.linearise(layout, solution.state)
     whole = np.zeros((len(layout.xy), 2, numbers + 1 + 6 * poses))
     for row in range(len(layout.xy)):
         point, image = 3 * layout.point[row], numbers + 1 + 6 * layout.photograph[row]

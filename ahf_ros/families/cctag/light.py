@@ -15,15 +15,7 @@ from itertools import product
 
 import numpy as np
 
-from ahf_ros.families.cctag.rays import (
-    BLACK,
-    PROFILE,
-    RAYS,
-    Limits,
-    Seen,
-    clipped,
-    ray_angles,
-)
+from ahf_ros.families.cctag.rays import BLACK, PROFILE, RAYS, Limits, Seen, clipped, ray_angles
 from ahf_ros.families.cctag.templates import less_lines
 from ahf_ros.vision import frame
 from ahf_ros.vision.array_record import ArrayRecord

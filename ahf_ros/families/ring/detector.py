@@ -20,12 +20,7 @@ from ahf_ros.families.pyramid_detector import PyramidDetector
 from ahf_ros.families.ring.bands import with_measured_bands
 from ahf_ros.families.ring.choice import choose_families, further_families
 from ahf_ros.families.ring.contests import among_others, resolve
-from ahf_ros.families.ring.families import (
-    contested,
-    decoded,
-    read_families,
-    settle_same_prints,
-)
+from ahf_ros.families.ring.families import contested, decoded, read_families, settle_same_prints
 from ahf_ros.families.ring.full_size import at_full_size
 from ahf_ros.families.ring.hypotheses import Hypotheses
 from ahf_ros.families.ring.known import WHOLE, Explained, Prior

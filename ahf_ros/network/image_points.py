@@ -1,14 +1,4 @@
-"""Normal equations of a network: poses are eliminated in 6x6 blocks, the rest stays dense [1]_.
-
-Targets are few and photographs many. The unknowns that stay, three coordinates a point and the
-free parameters of the cameras, make one dense matrix, whose inverse is the full covariance; what
-is eliminated costs a 6x6 factorisation a photograph, so that time grows linearly with them. The
-datum, and whatever is known without error, borders the reduced matrix.
-
-References
-----------
-.. [1] Triggs et al., Bundle adjustment: a modern synthesis, 2000, sections 6 and 9.
-"""
+"""Image points that are used, which unknowns they determine, and their residuals."""
 
 from __future__ import annotations
 
@@ -25,26 +15,6 @@ _FEWEST_POINTS = 3  # of a photograph: six coordinates determine a pose
 _FEWEST_RAYS = 2  # of a point
 BEHIND = 1e6  # residual in standard deviations of a point behind the camera
 _MEDIAN = np.sqrt(2 * np.log(2))  # of the length of a normal 2-vector
-
-
-@dataclass(frozen=True)
-class Groups:
-    """Rows grouped by a label: `labels` (g,) in ascending order, and sums of each group."""
-
-    labels: IntArray
-    order: IntArray
-    starts: IntArray
-
-    @classmethod
-    def by(cls, labels: IntArray) -> Groups:
-        """Group rows by labels (m,)."""
-        order = np.argsort(labels, kind='stable')
-        unique, starts = np.unique(labels[order], return_index=True)
-        return cls(unique, order, starts)
-
-    def sum(self, rows: FloatArray) -> FloatArray:
-        """Return the sums (g, ...) of rows (m, ...)."""
-        return np.add.reduceat(rows[self.order], self.starts, axis=0)
 
 
 @dataclass(frozen=True)
@@ -80,24 +50,6 @@ class Layout:
     def unknowns(self) -> int:
         """Number of unknowns that are not eliminated."""
         return 3 * len(self.points) + int(np.count_nonzero(self.free))
-
-
-@dataclass(frozen=True)
-class Normals:
-    """Normal equations: (n, 6, 6) of poses, (n, 6, u) mixed, (u, u) of the rest, right sides."""
-
-    pose: FloatArray
-    mixed: FloatArray
-    rest: FloatArray
-    pose_right: FloatArray
-    rest_right: FloatArray
-
-    def damped(self, damping: float) -> Normals:
-        """Return the normal equations with their diagonals enlarged, after Marquardt."""
-        pose, rest = self.pose.copy(), self.rest.copy()
-        pose[:, np.arange(6), np.arange(6)] *= 1 + damping
-        rest[np.diag_indices_from(rest)] *= 1 + damping
-        return replace(self, pose=pose, rest=rest)
 
 
 def lay_out(
@@ -249,139 +201,3 @@ def linearise(layout: Layout, state: NetworkState) -> Design:
         whitening @ (linear.by_calibration * layout.free[layout.camera][:, None, :]),
         (whitening @ (layout.xy - linear.xy)[:, :, None])[:, :, 0],
     )
-
-
-def assemble(layout: Layout, design: Design, weights: FloatArray) -> Normals:
-    """Return the normal equations of observation equations with further weights (m,)."""
-    root = np.sqrt(weights)[:, None, None]
-    pose, point, calibration = (
-        np.ascontiguousarray(root * part)
-        for part in (design.by_pose, design.by_point, design.by_calibration)
-    )
-    right = root * design.misclosure[:, :, None]
-    images = Groups.by(layout.photograph)
-    rays = Groups.by(layout.point)
-    count, unknowns = len(layout.photographs), layout.unknowns
-    coordinates = np.arange(3 * len(layout.points)).reshape(-1, 3)
-
-    mixed = np.zeros((count, 6, unknowns))
-    mixed[
-        layout.photograph[:, None, None],
-        np.arange(6)[:, None],
-        coordinates[layout.point][:, None, :],
-    ] = products(pose, point)
-    rest = np.zeros((unknowns, unknowns))
-    rest_right = np.zeros(unknowns)
-    rest[coordinates[:, :, None], coordinates[:, None, :]] = rays.sum(products(point, point))
-    rest_right[coordinates] = rays.sum(products(point, right)[:, :, 0])
-    columns = layout.columns
-    for index in np.flatnonzero(layout.free.any(axis=1)):
-        free = layout.free[index]
-        own = columns[index, free]
-        mine = layout.camera == index
-        part = calibration[mine][:, :, free]
-        of_images = Groups.by(layout.photograph[mine])
-        mixed[of_images.labels[:, None, None], np.arange(6)[:, None], own] = of_images.sum(
-            products(pose[mine], part)
-        )
-        of_points = Groups.by(layout.point[mine])
-        block = of_points.sum(products(point[mine], part)).reshape(-1, len(own))
-        rows = coordinates[of_points.labels].reshape(-1)
-        rest[rows[:, None], own] = block
-        rest[own[:, None], rows] = block.T
-        flat = part.reshape(-1, len(own))
-        rest[own[:, None], own] = flat.T @ flat
-        rest_right[own] = flat.T @ right[mine].reshape(-1)
-    return Normals(
-        images.sum(products(pose, pose)),
-        mixed,
-        rest,
-        images.sum(products(pose, right)[:, :, 0]),
-        rest_right,
-    )
-
-
-@dataclass(frozen=True)
-class Reduced:
-    """What remains without poses: their Cholesky factors, L^-1 of mixed blocks, and the rest."""
-
-    factor: FloatArray
-    half: FloatArray
-    half_right: FloatArray
-    matrix: FloatArray
-    right: FloatArray
-    scale: FloatArray
-    """(u,) by which rows and columns are multiplied before anything is solved or inverted."""
-
-
-def reduce(normals: Normals) -> Reduced:
-    """Eliminate the poses by their Schur complement."""
-    factor = np.asarray(np.linalg.cholesky(normals.pose), dtype=float)
-    half = np.linalg.solve(factor, normals.mixed)
-    half_right = np.linalg.solve(factor, normals.pose_right[:, :, None])[:, :, 0]
-    flat = half.reshape(-1, half.shape[2])
-    matrix = normals.rest - flat.T @ flat
-    least = np.finfo(float).eps * np.diag(normals.rest) + np.finfo(float).tiny
-    return Reduced(
-        factor,
-        half,
-        half_right,
-        matrix,
-        normals.rest_right - flat.T @ half_right.reshape(-1),
-        np.maximum(np.diag(matrix), least) ** -0.5,
-    )
-
-
-def solve(
-    reduced: Reduced, border: FloatArray, gap: FloatArray
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return changes of poses (n, 6), of the rest (u,), and multipliers (h,) of the border.
-
-    With the border's columns H (u, h), the changes x of the rest fulfil H'x = gap.
-    """
-    scale = reduced.scale
-    matrix, size = bordered(reduced, border)
-    changes = np.linalg.solve(matrix, np.concatenate([scale * reduced.right, gap / size]))
-    rest = scale * changes[: len(scale)]
-    left = reduced.half_right - reduced.half @ rest
-    poses = np.linalg.solve(reduced.factor.transpose(0, 2, 1), left[:, :, None])[:, :, 0]
-    return poses, rest, changes[len(scale) :] / size
-
-
-def changed(
-    layout: Layout, state: NetworkState, poses: FloatArray, rest: FloatArray
-) -> NetworkState:
-    """Return approximate values with changes of poses (n, 6) and of the rest (u,) added."""
-    calibrations, rotations = state.calibrations.copy(), state.rotations.copy()
-    positions, points = state.positions.copy(), state.points.copy()
-    calibrations[layout.free] += rest[layout.columns[layout.free]]
-    points[layout.points] += rest[: 3 * len(layout.points)].reshape(-1, 3)
-    positions[layout.photographs] += poses[:, :3]
-    rotations[layout.photographs] = (
-        camera.rotation_matrices(poses[:, 3:]) @ rotations[layout.photographs]
-    )
-    return replace(
-        state, calibrations=calibrations, rotations=rotations, positions=positions, points=points
-    )
-
-
-def products(left: FloatArray, right: FloatArray) -> FloatArray:
-    """Return A'B (m, a, b) of rows' blocks (m, 2, a) and (m, 2, b)."""
-    return left[:, 0, :, None] * right[:, 0, None, :] + left[:, 1, :, None] * right[:, 1, None, :]
-
-
-def bordered(reduced: Reduced, border: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the scaled and bordered matrix, and the sizes (h,) that its border had.
-
-    Columns of the border that depend on each other are a LinAlgError: of the singular matrix that
-    they would make, rounding decides whether it can be solved.
-    """
-    scale = reduced.scale
-    columns = scale[:, None] * border
-    size = np.linalg.norm(columns, axis=0)
-    columns = columns / size
-    if columns.size and np.linalg.matrix_rank(columns) < len(size):
-        raise np.linalg.LinAlgError('columns of the border depend on each other')
-    empty = np.zeros((border.shape[1], border.shape[1]))
-    scaled = scale[:, None] * reduced.matrix * scale
-    return np.block([[scaled, columns], [columns.T, empty]]), size
