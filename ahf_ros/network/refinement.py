@@ -1,5 +1,6 @@
 """The light adjustment, robust and without covariances, for the search of approximate values.
 
+Residuals of these say how far they agree with what was observed.
 What is usual of lenses is an observation, while nothing better is known of a camera.
 """
 
@@ -14,7 +15,7 @@ from ahf_ros.network.camera import PARAMETERS, parameters_of
 from ahf_ros.network.datum import movements
 from ahf_ros.network.image_points import Layout
 from ahf_ros.network.least_squares import Conditions, Knowledge, minimise
-from ahf_ros.network.network import Network
+from ahf_ros.network.network import FloatArray, Network
 from ahf_ros.network.solution import NetworkState
 
 _AGREES = 5.0  # standard deviations, or robust ones, of an observation that agrees
@@ -86,3 +87,26 @@ def usual_lens(network: Network, layout: Layout) -> Knowledge:
         )
 
     return conditions
+
+
+def lengths_of(network: Network, start: NetworkState) -> FloatArray:
+    """Return residuals (m,) in standard deviations, NaN where pose or point are not known.
+
+    Points behind a camera that has a pose have infinite ones.
+    """
+    observed = network.observations
+    known = np.isfinite(start.positions[observed.photograph, 0])
+    known &= np.isfinite(start.points[observed.point, 0])
+    lengths = np.full(len(observed.xy), np.nan)
+    lengths[known] = np.inf
+    every = np.ones(len(known), dtype=bool)
+    layout = image_points.lay_out(network, start, every, free_parameters(network, ()))
+    if len(layout.xy):
+        lengths[layout.observations] = image_points.whitened_lengths(layout, start)
+    return lengths
+
+
+def spread_of(lengths: FloatArray) -> float:
+    """Return the robust spread of residuals in standard deviations, at least one."""
+    known = lengths[~np.isnan(lengths)]
+    return max(1.0, image_points.robust_spread(known)) if len(known) else np.inf

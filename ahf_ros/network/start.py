@@ -15,12 +15,12 @@ from ahf_ros.network.camera import known_calibration
 from ahf_ros.network.network import FloatArray, IntArray, Network
 from ahf_ros.network.planar import mirrored
 from ahf_ros.network.progress import stage
-from ahf_ros.network.refinement import refine
+from ahf_ros.network.refinement import lengths_of, refine, spread_of
 from ahf_ros.network.resection import ALIKE, BOUND, FEWEST_POINTS, Resection, resections
 from ahf_ros.network.solution import NetworkState
 from ahf_ros.network.triangulation import intersect
 from ahf_ros.network.triples import WEAK, focal_sigma, known_calibrations, seeds, with_lens
-from ahf_ros.network.views import View, lengths_of, spread_of, views_of
+from ahf_ros.network.views import View, views_of
 from ahf_ros.network.zoom import with_own_focal, with_own_zooms
 
 MOST_SEEDS = 5

@@ -15,12 +15,12 @@ from ahf_ros.network.image_points import BEHIND
 from ahf_ros.network.least_squares import precision
 from ahf_ros.network.network import CameraView, FloatArray, IntArray, Network, part_of
 from ahf_ros.network.planar import mirrored
-from ahf_ros.network.refinement import free_parameters, refine, usual_lens
+from ahf_ros.network.refinement import free_parameters, lengths_of, refine, spread_of, usual_lens
 from ahf_ros.network.relative import relative_orientations
 from ahf_ros.network.resection import resections
 from ahf_ros.network.solution import NetworkState
 from ahf_ros.network.triangulation import SMALLEST_ANGLE, directions, midpoints
-from ahf_ros.network.views import View, largest_angles, lengths_of, spread_of
+from ahf_ros.network.views import View, largest_angles
 
 STEPS = np.geomspace(0.5, 4.0, 14)
 """Focal lengths that are tried where none is known, in widths of the image: 17 % apart."""

@@ -1,13 +1,11 @@
-"""Observations by photograph, and which of them agree with approximate values."""
+"""Observations by photograph, and under which angles targets are seen."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from ahf_ros.network import image_points
 from ahf_ros.network.camera import undistort
 from ahf_ros.network.network import FloatArray, IntArray, Network
-from ahf_ros.network.refinement import free_parameters
 from ahf_ros.network.solution import NetworkState
 from ahf_ros.network.triangulation import largest_angle
 
@@ -52,29 +50,6 @@ def views_of(network: Network) -> list[View]:
         fisheye = network.cameras[camera].equidistant
         made.append(View(int(camera), points, observed.xy[rows], sigma[rows], rows, fisheye))
     return made
-
-
-def lengths_of(network: Network, start: NetworkState) -> FloatArray:
-    """Return residuals (m,) in standard deviations, NaN where pose or point are not known.
-
-    Points behind a camera that has a pose have infinite ones.
-    """
-    observed = network.observations
-    known = np.isfinite(start.positions[observed.photograph, 0])
-    known &= np.isfinite(start.points[observed.point, 0])
-    lengths = np.full(len(observed.xy), np.nan)
-    lengths[known] = np.inf
-    every = np.ones(len(known), dtype=bool)
-    layout = image_points.lay_out(network, start, every, free_parameters(network, ()))
-    if len(layout.xy):
-        lengths[layout.observations] = image_points.whitened_lengths(layout, start)
-    return lengths
-
-
-def spread_of(lengths: FloatArray) -> float:
-    """Return the robust spread of residuals in standard deviations, at least one."""
-    known = lengths[~np.isnan(lengths)]
-    return max(1.0, image_points.robust_spread(known)) if len(known) else np.inf
 
 
 def largest_angles(network: Network, start: NetworkState) -> FloatArray:

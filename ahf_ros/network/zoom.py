@@ -13,11 +13,11 @@ import numpy as np
 from ahf_ros.base.text import counted
 from ahf_ros.network.camera import pinhole
 from ahf_ros.network.network import FloatArray, IntArray, Network
-from ahf_ros.network.refinement import refine
+from ahf_ros.network.refinement import lengths_of, refine, spread_of
 from ahf_ros.network.resection import FEWEST_POINTS, Resection, resections
 from ahf_ros.network.solution import NetworkState, Solution
 from ahf_ros.network.triples import LENS, STEPS, focal_steps
-from ahf_ros.network.views import View, lengths_of, spread_of
+from ahf_ros.network.views import View
 
 _ZOOMED = 0.01  # change of a photograph's focal length that is another zoom
 _SUSPECT = 0.8  # share of a photograph's observations that agree, below which its zoom is tested
