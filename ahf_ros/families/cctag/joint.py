@@ -8,6 +8,7 @@ of light are fitted to the pixels at once, for the place of targets and for doub
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from operator import itemgetter
 
@@ -127,23 +128,20 @@ class _Scene:
 
         Where the pixels are unlike what is usual, light of fewer edges is tried.
         """
-        fits: dict[int, Fit] = {}
         rings = replace(rings, sharpening=self.usual.camera.sharpening_of(rings))
         worse = self.usual.unusual
-        for row, begun in self.begun.items():
-            fits[row] = fitted(begun.patch, begun.formed, self.usual)
-        usual = {row for row, fit in fits.items() if worse(fit) <= _UNUSUAL}
-        rows = np.array([row for row in range(len(rings.ids)) if row not in usual], int)
+        fits = {row: fitted(it.patch, it.formed, self.usual) for row, it in self.begun.items()}
         for most in range(EDGES, 0, -1):
-            for row, fit in zip(rows.tolist(), self._fits(rings.select(rows), most), strict=True):
-                if fit and (row not in fits or worse(fit) < worse(fits[row])):
+            every = range(len(rings.ids))
+            rows = [row for row in every if row not in fits or worse(fits[row]) > _UNUSUAL]
+            for index, fit in self._fits(rings.select(np.array(rows, int)), most):
+                row = rows[index]
+                if row not in fits or worse(fit) < worse(fits[row]):
                     fits[row] = fit
-            unusual = [row for row, fit in fits.items() if worse(fit) > _UNUSUAL]
-            rows = np.array(unusual, int)
         return fits
 
-    def _fits(self, rings: Aligned, most: int) -> list[Fit | None]:
-        fits: list[Fit | None] = []
+    def _fits(self, rings: Aligned, most: int) -> Iterator[tuple[int, Fit]]:
+        """Yield fits of targets in light of so many edges, by their rows."""
         lights = Lights.about(self.light, rings.frames, most)
         most_shift = MAXIMUM_SHIFT * self.family.narrow
         for row, circles in enumerate(signed_circles(self.family, rings.ids)):
@@ -151,11 +149,7 @@ class _Scene:
             own, light = rings.select(only), lights.select(only)
             patch = Patch.about(self.gray, own, circles, light, self.gamma, most_shift)
             if len(patch.seen) > _FEWEST:
-                first = self.usual.first(patch.first(own, light))
-                fits.append(fitted(patch, first, self.usual))
-            else:
-                fits.append(None)
-        return fits
+                yield row, fitted(patch, self.usual.first(patch.first(own, light)), self.usual)
 
     def placed(self, rings: Aligned, fit: Fit) -> Aligned:
         """Return the rings of a target, (1,), where a good fit is."""

@@ -308,7 +308,7 @@ def _first_look(rest: np.ndarray, size: np.ndarray, count: int) -> np.ndarray:
         for row, own, tried in zip(some, gain, first, strict=True):
             of, one = steps[tried] @ steps.T, own[tried, None]
             both = (one**2 + own**2 - 2 * of * one * own) / np.maximum(1 - of**2, 0.1)
-            index, second = np.unravel_index(both.argmax(), both.shape)
+            index, second = divmod(int(both.argmax()), len(steps))
             best[row] = edges[[tried[index], second]]
     return best
 
@@ -349,24 +349,19 @@ def _away(
 def _steps(edges: np.ndarray, x: np.ndarray, y: np.ndarray, width: np.ndarray) -> np.ndarray:
     """Return the steps of edges (k, e, 5) at points, in their heights, shape (k, e, m, n)."""
     share = normal_integral(_away(edges, x, y)[0] / _own_widths(edges, width))
-    height, more = _growth(edges)
-    return np.log(1 + more * share) / height
+    return _logarithms(share, edges)[0]
 
 
 def _logarithms(share: np.ndarray, edges: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return steps of ln of light, in their heights, and the derivative by the share of light.
 
-    Blur mixes light, and not its logarithm.
+    Blur mixes light, and not its logarithm. No height is 0.
     """
-    height, more = _growth(edges)
-    return np.log(1 + more * share) / height, more / height / (1 + more * share)
-
-
-def _growth(edges: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the heights of edges (k, e, 5), ln, none of them 0, and by how much light grows."""
     height = _columns(edges)[3]
     height = np.where(np.abs(height) < 0.01, np.float32(0.01), height)
-    return height, np.expm1(height)
+    more = np.expm1(height)
+    light = 1 + more * share
+    return np.log(light) / height, more / height / light
 
 
 def _own_widths(edges: np.ndarray, width: np.ndarray) -> np.ndarray:

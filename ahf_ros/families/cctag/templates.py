@@ -164,27 +164,10 @@ def rings_along(
     These are by the radius, in radii of the target, by the shift, px, by ln of the blur and by the
     sharpening.
     """
-    return _circles(signed_circles(family, ids), size, shift, blur, sharpening)
-
-
-def signed_circles(family: CctagPrint, ids: np.ndarray) -> np.ndarray:
-    """Return the radii of the circles of IDs (k,), below 0 where paper fills them, (k, c)."""
-    radii = family.radii(ids)
-    return _signs(radii) * radii
-
-
-def _circles(
-    signed: np.ndarray,
-    size: np.ndarray,
-    shift: np.ndarray,
-    blur: np.ndarray,
-    sharpening: np.ndarray,
-) -> tuple[np.ndarray, ...]:
-    """Return what `rings_along` does, of circles of radii (k, c), below 0 if paper fills them."""
     size, shift, blur, sharpening = (
         of[:, None, None].astype(np.float32) for of in (size, shift, blur, sharpening)
     )
-    signed = signed[..., None].astype(np.float32)
+    signed = signed_circles(family, ids)[..., None].astype(np.float32)
     sign = np.sign(signed)
     radii = np.abs(signed) * size + sign * shift
     seen = _blurred(radii, sign, size, blur)
@@ -195,6 +178,12 @@ def _circles(
     return *((1 + more) * of - more * less for of, less in zip(seen, masked, strict=True)), (
         seen[0] - masked[0]
     )
+
+
+def signed_circles(family: CctagPrint, ids: np.ndarray) -> np.ndarray:
+    """Return the radii of the circles of IDs (k,), below 0 where paper fills them, (k, c)."""
+    radii = family.radii(ids)
+    return radii * (1 - 2 * (np.arange(radii.shape[1]) % 2))
 
 
 def _blurred(
@@ -214,8 +203,3 @@ def _blurred(
 def _places(blur: np.ndarray, size: np.ndarray | float) -> np.ndarray:
     """Return where along the profile blur moves what lies near to the centre, outwards (Rice)."""
     return np.sqrt(ALONG**2 + (blur / size) ** 2)
-
-
-def _signs(radii: np.ndarray) -> np.ndarray:
-    """Return 1 for circles that ink fills, -1 for those that paper fills, from shape (k, n)."""
-    return np.where(np.arange(radii.shape[1]) % 2 == 0, np.float32(1), np.float32(-1))
