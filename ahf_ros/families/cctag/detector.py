@@ -13,7 +13,6 @@ from dataclasses import dataclass, replace
 from itertools import product
 from typing import ClassVar
 
-import cv2
 import numpy as np
 
 from ahf_ros.base.blas import one_blas_thread
@@ -55,8 +54,6 @@ _PROBABLE = 0.5  # confidence of targets that tell of edges together
 _POSSIBLE = 0.01  # probability of a target, from which it is read again
 _ALIKE = 0.25  # share of what rays show, the same on all in light without edges
 _IN_A_ROW = 32  # likely frames without a target, which hardly any others precede
-_FULL, _HALVES = slice(1), slice(1, None)  # of octaves, whose images are read at once
-_BORDER = 160  # px, beyond an image, farther than circles about frames in it reach
 _CERTAIN = 0.75  # confidence from which a target is reported
 _SURE_OF_TARGET = 0.9  # probability of a target, from which it is reported without its ID
 _PLAUSIBLE = 0.6  # share of rays that agree, of a target that is measured again
@@ -162,10 +159,7 @@ class _Look:
 def _looks(
     of_octaves: Sequence[Octave], kinds: Sequence[tuple[int, CctagPrint]], prior: Prior
 ) -> dict[int, list[_Look]]:
-    """Return what looks like targets of some colours and families, by the levels of octaves.
-
-    Halves of the image have few of them, whose light is found together.
-    """
+    """Return what looks like targets of some colours and families, by the levels of octaves."""
     if not of_octaves:
         return {}
     circles = []
@@ -176,65 +170,30 @@ def _looks(
     if not len(every.frames):
         return {octave.level: [] for octave in of_octaves}
     frames = likely_rings(every, [it.radii for it in of_octaves], kinds)
-    lights = [
-        of
-        for part in (_FULL, _HALVES)
-        for of in _first_lights([it.pyramid for it in of_octaves[part]], frames[part])
-    ]
     return {
         octave.level: [
-            _Look(polarity, family, some, light, prior)
-            for (polarity, family), some, light in zip(kinds, own, lit_by, strict=True)
+            _Look(*kind, some, light, prior)
+            for kind, some, light in zip(
+                kinds, own, _first_lights(octave.pyramid.gray, own), strict=True
+            )
         ]
-        for octave, own, lit_by in zip(of_octaves, frames, lights, strict=True)
+        for octave, own in zip(of_octaves, frames, strict=True)
     }
 
 
-def _first_lights(
-    pyramids: Sequence[ImagePyramid], frames: Sequence[Sequence[np.ndarray]]
-) -> list[list[Lights]]:
-    """Return light of one edge about the first frames of all kinds in images.
+def _first_lights(gray: np.ndarray, frames: Sequence[np.ndarray]) -> list[Lights]:
+    """Return light of one edge about the first frames of all kinds in an image.
 
     Frames that do not show the same all around have none, nor those that no edge of light could
-    make do so. The images are read as one.
+    make do so.
     """
-    if not pyramids:
-        return []
-    stacked, places = _stacked(pyramids)
-    first = [
-        [frame.translated(it[:_IN_A_ROW], *place) for it in of]
-        for place, of in zip(places, frames, strict=True)
-    ]
-    every = np.concatenate([it for of in first for it in of])
-    some = np.flatnonzero(shares_alike(stacked, every) >= _ALIKE)
-    lights = Lights.about(stacked, every[some], 1)
-    same = show_the_same(stacked, lights)
-    lights, rows, start = lights.select(same), some[same], 0
-    found: list[list[Lights]] = []
-    for (x, y), of in zip(places, first, strict=True):
-        found.append([])
-        for it in of:
-            own = slice(*np.searchsorted(rows, (start, start + len(it))))
-            found[-1].append(lights.select(own).translated(-x, -y))
-            start += len(it)
-    return found
-
-
-def _stacked(pyramids: Sequence[ImagePyramid]) -> tuple[np.ndarray, list[tuple[int, int]]]:
-    """Return images above one another, with their borders repeated, and where they are, px."""
-    if len(pyramids) == 1:
-        return pyramids[0].gray, [(0, 0)]
-    shapes = [it.image.shape for it in pyramids]
-    wide = max(width for _, width in shapes)
-    bottoms = np.cumsum([height + 2 * _BORDER for height, _ in shapes]).tolist()
-    stacked = np.empty((bottoms[-1], wide + 2 * _BORDER), np.float32)
-    places = []
-    for it, bottom, (height, width) in zip(pyramids, bottoms, shapes, strict=True):
-        top = bottom - height - 2 * _BORDER
-        sides = _BORDER, _BORDER, _BORDER, _BORDER + wide - width
-        cv2.copyMakeBorder(it.gray, *sides, cv2.BORDER_REPLICATE, stacked[top:bottom])
-        places.append((_BORDER, top + _BORDER))
-    return stacked, places
+    first = [it[:_IN_A_ROW] for it in frames]
+    every, kinds = np.concatenate(first), np.repeat(np.arange(len(first)), [*map(len, first)])
+    some = np.flatnonzero(shares_alike(gray, every) >= _ALIKE)
+    lights = Lights.about(gray, every[some], 1)
+    same = show_the_same(gray, lights)
+    lights, kinds = lights.select(same), kinds[some[same]]
+    return [lights.select(kinds == kind) for kind in range(len(first))]
 
 
 def _identified(gray: np.ndarray, look: _Look) -> tuple[Aligned, np.ndarray]:

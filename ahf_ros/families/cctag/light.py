@@ -87,11 +87,6 @@ class Lights(ArrayRecord):
         light += _mixed(light, slope, _LENS / size, radii[1] - radii[0])
         return np.exp(light.clip(-_MOST_LIGHT, _MOST_LIGHT))
 
-    def translated(self, x: float, y: float) -> Lights:
-        """Return the same light in the pixels of an image that shows (0, 0) at (x, y)."""
-        frames, moved = (frame.translated(of, x, y) for of in (self.frames, self.moved))
-        return replace(self, frames=frames, moved=moved)
-
     @staticmethod
     def about(gray: np.ndarray, frames: np.ndarray, most: int = EDGES) -> Lights:
         """Return the light about targets whose frames, (k, 3, 3), are known to about a tenth.
