@@ -8,13 +8,14 @@ linear function of the ink of sharp rings under a normal blur.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from ahf_ros.families.cctag.light import Lights, lit
 from ahf_ros.families.cctag.prior import USUAL, Prior
-from ahf_ros.families.cctag.rays import ALONG, PROFILE, RAYS, Rays, robust_rays
+from ahf_ros.families.cctag.rays import ALONG, PROFILE, RAYS, Rays, Seen, robust_rays
 from ahf_ros.families.cctag.templates import MASK, MAXIMUM_SHIFT, rings_along
 from ahf_ros.prints.cctag import CctagPrint
 from ahf_ros.vision import frame
@@ -146,47 +147,72 @@ def _aligned(
     count: int,
 ) -> Aligned:
     """Return what `align` does, by Gauss-Newton with robust weights."""
-    shift, blur, sharpening = edges.T
     for outlier in _OUTLIERS:
         size = frame.mean_radii(frames)
         seen = lit(gray, frames, lights, count)
-        ink, slope, *by_edges = rings_along(family, ids, size, shift, blur, sharpening)
-        rays = robust_rays(seen, ink, outlier)
-        by_radius = [slope, slope * ALONG, slope * ALONG**2]
-        normal, right = rays.equations(np.stack([*by_radius, *by_edges], axis=1), ink)
-        variance = (rays.weight * rays.errors**2).sum(axis=(1, 2)) / rays.weight.sum(axis=(1, 2))
-        area = size**2 * (PROFILE[1] - PROFILE[0]) * 2 * np.pi / count
-        # Pixels are independent.
-        each = np.minimum(area, 1.0) / (variance + _LEAST_VARIANCE) / _OF_VARIANCE
-        normal, right = normal * each[:, None, None], right * each[:, None]
-        normal[:, range(5), range(5)] += 1e-6
-        usual = usual_perspective(frames)
-        normal[:, 5:7, 5:7] += usual
-        right[:, 5:7] -= (usual @ frames[:, 2, :2, None])[..., 0]
-        known = np.array(prior.deviations) ** -2
-        normal[:, range(7, 10), range(7, 10)] += known
-        right[:, 7:] -= prior.away(shift, blur, sharpening) * known
-        change = np.linalg.solve(normal, right[..., None])[..., 0]
-        # What goes beyond a bound is held there, so that the others do not make up for it.
-        bounded = np.clip(sharpening + change[:, 9], *_SHARPENINGS) - sharpening
-        held = np.where(bounded == change[:, 9], 0.0, _HELD)
-        normal[:, 9, 9] += held
-        right[:, 9] += held * bounded
-        change = np.linalg.solve(normal, right[..., None])[..., 0]
-        limit = np.concatenate([np.full(7, _MAXIMUM_CHANGE), _MOST_OF_EDGES])
-        change = np.clip(change, -limit, limit)
+        inks = rings_along(family, ids, size, *edges.T)
+        rays = robust_rays(seen, inks[0], outlier)
+        change, normal = _changed(rays, inks, frames, edges, prior)
         frames = frame.moved(frames, change[:, :7])
-        narrow = family.narrow * size
-        shift = np.clip(shift + change[:, 7], -MAXIMUM_SHIFT * narrow, MAXIMUM_SHIFT * narrow)
-        blur = np.clip(
-            blur * np.exp(change[:, 8]), _SHARPEST, np.maximum(_SOFTEST * narrow, _SHARPEST)
+        narrow, of_edges = family.narrow * size, edges + change[:, 7:]
+        of_edges[:, 1] = edges[:, 1] * np.exp(change[:, 8])
+        edges = np.stack(
+            [
+                np.clip(of_edges[:, 0], -MAXIMUM_SHIFT * narrow, MAXIMUM_SHIFT * narrow),
+                np.clip(of_edges[:, 1], _SHARPEST, np.maximum(_SOFTEST * narrow, _SHARPEST)),
+                np.clip(of_edges[:, 2], *_SHARPENINGS),
+            ],
+            axis=1,
         )
-        sharpening = np.clip(sharpening + change[:, 9], *_SHARPENINGS)
     covariance = frame.centre_covariance(frames, np.linalg.inv(normal)[:, :2, :2])
     seen = lit(gray, frames, lights, count)
-    size = frame.mean_radii(frames)
-    ink = rings_along(family, ids, size, shift, blur, sharpening)[0]
-    rays = Rays.of(seen, ink)
+    rays = Rays.of(seen, rings_along(family, ids, frame.mean_radii(frames), *edges.T)[0])
+    return _described(seen, rays, frames, ids, edges, covariance, family.narrow, prior)
+
+
+def _changed(
+    rays: Rays, inks: Sequence[np.ndarray], frames: np.ndarray, edges: np.ndarray, prior: Prior
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the changes of frames and edges, (k, 10), that rays ask for, and normal matrices."""
+    ink, slope, *by_edges = inks
+    by_radius = [slope, slope * ALONG, slope * ALONG**2]
+    normal, right = rays.equations(np.stack([*by_radius, *by_edges], axis=1), ink)
+    variance = (rays.weight * rays.errors**2).sum(axis=(1, 2)) / rays.weight.sum(axis=(1, 2))
+    area = frame.mean_radii(frames) ** 2 * (PROFILE[1] - PROFILE[0]) * 2 * np.pi
+    # Pixels are independent.
+    each = np.minimum(area / rays.step.shape[1], 1.0) / (variance + _LEAST_VARIANCE) / _OF_VARIANCE
+    normal, right = normal * each[:, None, None], right * each[:, None]
+    normal[:, range(5), range(5)] += 1e-6
+    usual = usual_perspective(frames)
+    normal[:, 5:7, 5:7] += usual
+    right[:, 5:7] -= (usual @ frames[:, 2, :2, None])[..., 0]
+    known = np.array(prior.deviations) ** -2
+    normal[:, range(7, 10), range(7, 10)] += known
+    right[:, 7:] -= prior.away(*edges.T) * known
+    change = np.linalg.solve(normal, right[..., None])[..., 0]
+    # What goes beyond a bound is held there, so that the others do not make up for it.
+    sharpening = edges[:, 2]
+    bounded = np.clip(sharpening + change[:, 9], *_SHARPENINGS) - sharpening
+    held = np.where(bounded == change[:, 9], 0.0, _HELD)
+    normal[:, 9, 9] += held
+    right[:, 9] += held * bounded
+    change = np.linalg.solve(normal, right[..., None])[..., 0]
+    limit = np.concatenate([np.full(7, _MAXIMUM_CHANGE), _MOST_OF_EDGES])
+    return np.clip(change, -limit, limit), normal
+
+
+def _described(
+    seen: Seen,
+    rays: Rays,
+    frames: np.ndarray,
+    ids: np.ndarray,
+    edges: np.ndarray,
+    covariance: np.ndarray,
+    narrow: float,
+    prior: Prior,
+) -> Aligned:
+    """Return rings in their places, and how well they explain what rays show."""
+    size, (shift, blur, sharpening) = frame.mean_radii(frames), edges.T
     left, shown, mean = (
         (of @ ALONG).astype(np.float64) for of in (rays.errors**2, seen.values**2, seen.values)
     )
@@ -215,7 +241,7 @@ def _aligned(
             blur / size,
         ),
         unusual=_unusual(shift, blur, prior) * np.minimum(3 * (1 - agree), 1)
-        + _hiding(shift, sharpening, known, family.narrow * size),
+        + _hiding(shift, sharpening, known, narrow * size),
         known=known,
         margin=np.full(len(frames), np.nan),
         by_pixels=np.zeros(len(frames)),

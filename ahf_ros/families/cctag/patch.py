@@ -161,18 +161,15 @@ class Patch:
         heights = light.heights[0, 2:]
         edges = light.edges[0, heights != 0]
         edges[:, _HEIGHT] = heights[heights != 0].clip(-_HIGHEST, _HIGHEST)
-        wide = (
-            usual_widths(np.array(self.light_size)) * np.exp(edges[:, _WIDTH]) * self.light_size
-        ) ** 2
-        sharp = np.sqrt(np.maximum(wide - blur**2, _SHARP**2))
-        edges[:, _WIDTH] = np.log(sharp / self.light_size)
+        size = self.light_size
+        wide = usual_widths(np.array(size)) * np.exp(edges[:, _WIDTH]) * size
+        edges[:, _WIDTH] = np.log(np.sqrt(np.maximum(wide**2 - blur**2, _SHARP**2)) / size)
         formed = Formed(
             rings.frames[0], float(rings.shift[0]), blur, 0.0, light.heights[0, :2], edges
         )
         bright = self._light(formed)[0]
         inked = bright * self._ink(formed)[0]
-        both = self._blurred(np.stack([bright, inked], axis=1), blur)
-        both = both.transpose(1, 0, 2)[:, self.known].T
+        both = self._blurred(np.stack([bright, inked], axis=1), blur).swapaxes(1, 2)[self.known]
         seen = (self.seen / self.seen.max()) ** self.gamma
         paper, step = np.linalg.lstsq(both.T @ both, both.T @ seen, rcond=None)[0]
         return replace(formed, contrast=max(float(step / max(paper, _DARK)), _DARKEST))

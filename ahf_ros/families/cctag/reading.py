@@ -61,11 +61,12 @@ def identify(
     first, likely = first.select(possible), likely.select(possible)
     lights = lights.select(possible)
     moved = np.flatnonzero(_moved(lights.frames, first.frames))
-    lights = lights.replaced(moved, Lights.about(gray, first.frames[moved], most))
-    others = likely_ids(gray, lights.select(moved), polarity, family, prior)
-    likely = likely.replaced(moved, others).beside(likely)
-    again = align(gray, *others.first, family, prior, lights.select(moved), FEW_RAYS)
-    first = first.replaced(moved, again)
+    if len(moved):
+        anew = Lights.about(gray, first.frames[moved], most)
+        others = likely_ids(gray, anew, polarity, family, prior)
+        again = align(gray, *others.first, family, prior, anew, FEW_RAYS)
+        likely = likely.replaced(moved, others).beside(likely)
+        first, lights = first.replaced(moved, again), lights.replaced(moved, anew)
     possible = first.of_target > _HOPELESS[1]
     if not possible.any():
         return NOTHING
