@@ -136,11 +136,6 @@ class Usual:
         usual, deviation = self.misfits
         return (math.log(max(fit.misfit(self), 1e-9)) - usual) / deviation
 
-    def first(self, formed: Formed) -> Formed:
-        """Return what forms pixels, with the contrast that is usual if that is known."""
-        known = self.deviations[2] < _DEVIATIONS[2]
-        return replace(formed, contrast=float(self.values[2])) if known else formed
-
     def variances(self, shown: np.ndarray) -> np.ndarray:
         """Return the variances of gray values."""
         return self.noise[0] + self.noise[1] * np.maximum(shown, 0)
