@@ -152,18 +152,14 @@ def _aligned(
         seen = lit(gray, frames, lights, count)
         inks = rings_along(family, ids, size, *edges.T)
         rays = robust_rays(seen, inks[0], outlier)
-        change, normal = _changed(rays, inks, frames, edges, prior)
+        change, normal = _changed(rays, inks, frames, size, edges, prior)
         frames = frame.moved(frames, change[:, :7])
         narrow, of_edges = family.narrow * size, edges + change[:, 7:]
         of_edges[:, 1] = edges[:, 1] * np.exp(change[:, 8])
-        edges = np.stack(
-            [
-                np.clip(of_edges[:, 0], -MAXIMUM_SHIFT * narrow, MAXIMUM_SHIFT * narrow),
-                np.clip(of_edges[:, 1], _SHARPEST, np.maximum(_SOFTEST * narrow, _SHARPEST)),
-                np.clip(of_edges[:, 2], *_SHARPENINGS),
-            ],
-            axis=1,
-        )
+        shift, blur = MAXIMUM_SHIFT * narrow, np.maximum(_SOFTEST * narrow, _SHARPEST)
+        (least, most), none = _SHARPENINGS, 0 * narrow
+        lowest = np.array([-shift, none + _SHARPEST, none + least])
+        edges = of_edges.clip(lowest.T, np.array([shift, blur, none + most]).T)
     covariance = frame.centre_covariance(frames, np.linalg.inv(normal)[:, :2, :2])
     seen = lit(gray, frames, lights, count)
     rays = Rays.of(seen, rings_along(family, ids, frame.mean_radii(frames), *edges.T)[0])
@@ -171,14 +167,19 @@ def _aligned(
 
 
 def _changed(
-    rays: Rays, inks: Sequence[np.ndarray], frames: np.ndarray, edges: np.ndarray, prior: Prior
+    rays: Rays,
+    inks: Sequence[np.ndarray],
+    frames: np.ndarray,
+    size: np.ndarray,
+    edges: np.ndarray,
+    prior: Prior,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the changes of frames and edges, (k, 10), that rays ask for, and normal matrices."""
     ink, slope, *by_edges = inks
     by_radius = [slope, slope * ALONG, slope * ALONG**2]
     normal, right = rays.equations(np.stack([*by_radius, *by_edges], axis=1), ink)
     variance = (rays.weight * rays.errors**2).sum(axis=(1, 2)) / rays.weight.sum(axis=(1, 2))
-    area = frame.mean_radii(frames) ** 2 * (PROFILE[1] - PROFILE[0]) * 2 * np.pi
+    area = size**2 * (PROFILE[1] - PROFILE[0]) * 2 * np.pi
     # Pixels are independent.
     each = np.minimum(area / rays.step.shape[1], 1.0) / (variance + _LEAST_VARIANCE) / _OF_VARIANCE
     normal, right = normal * each[:, None, None], right * each[:, None]

@@ -300,11 +300,12 @@ def _first_look(rest: np.ndarray, size: np.ndarray, count: int) -> np.ndarray:
             best[some, 0] = edges[np.abs(gain).argmax(axis=1)]
             continue
         first = np.argpartition(-np.abs(gain), _FIRST, axis=1)[:, :_FIRST]
-        one, own = np.take_along_axis(gain, first, axis=1)[..., None], gain[:, None]
+        rows = np.arange(len(some))
+        one, own = gain[rows[:, None], first][..., None], gain[:, None]
         of = steps[first] @ steps.T
         both = (one**2 + own**2 - 2 * of * one * own) / np.maximum(1 - of**2, 0.1)
         index, second = np.divmod(both.reshape(len(some), -1).argmax(axis=1), len(steps))
-        best[some] = edges[np.stack([first[np.arange(len(some)), index], second], axis=1)]
+        best[some] = edges[np.array([first[rows, index], second]).T]
     return best
 
 
