@@ -151,9 +151,19 @@ def fit_circles_of_any_blur(
     """Move frames onto the edges of circles as `fit_circles`, and those with soft edges once more.
 
     How soft edges are is known only when they have been measured. A step that is sharper than an
-    edge is fitted to a part of it, at the wrong place.
+    edge is fitted to a part of it, at the wrong place. The shortest profiles, of 1 px, show the
+    usual blur, and longer ones as much softer edges: beyond, the fit of a narrow ellipse is lost.
     """
-    fit = fit_circles(gray, frames, circles, reach=reach, projective=projective, rounds=rounds)
+    softest = np.clip(USUAL_BLUR * np.ravel(reach) * frame.ellipse_axes(frames)[1], *BLURS)
+    fit = fit_circles(
+        gray,
+        frames,
+        circles,
+        reach=reach,
+        projective=projective,
+        rounds=rounds,
+        softest=softest,
+    )
     soft = np.flatnonzero((fit.blur > SOFT) & (fit.share >= ENOUGH))
     if not soft.size:
         return fit
@@ -166,6 +176,7 @@ def fit_circles_of_any_blur(
         projective=projective,
         rounds=_SOFT_ROUNDS,
         blur=first.blur,
+        softest=softest[soft],
     )
     good = again.share >= ENOUGH
     return fit.replaced(soft[good], again.select(good))
@@ -180,6 +191,7 @@ def fit_circles(
     projective: bool,
     rounds: int = 2,
     blur: np.ndarray | None = None,
+    softest: float | np.ndarray = BLURS[1],
     covariances: bool = True,
     uneven: bool = False,
 ) -> Fit:
@@ -188,8 +200,9 @@ def fit_circles(
     Edges within `reach` of a circle, dot radii, a number or of shape (k, 1), are measured `rounds`
     times in `gray`, float32 from 0 to 255. In a projective fit the circles have different radii,
     so that they determine the common centre; otherwise it is the centre of the ellipse. `blur`,
-    shape (k,), is the standard deviation of the edges, px, as far as it is known. `uneven` light
-    moves edges as noise does; the share is the dot's where less of the dot is in place.
+    shape (k,), is the standard deviation of the edges, px, as far as it is known, and `softest`
+    the largest one that is tried. `uneven` light moves edges as noise does; the share is the dot's
+    where less of the dot is in place.
     """
     blur = np.full(len(frames), USUAL_BLUR) if blur is None else blur
     kind = _kind(circles, projective=projective, uneven=uneven)
@@ -198,7 +211,7 @@ def fit_circles(
         frames = moved
         fit = fit_edges(gray, frames, circles, kind, blur, reach)
         edges = fit.edges
-        blur = np.clip(blur + median(edges.softness, edges.visible, 0.0), *BLURS)
+        blur = np.clip(blur + median(edges.softness, edges.visible, 0.0), BLURS[0], softest)
         of_frame = fit.unknowns[:, : 7 if projective else 5]
         moved = frame.moved(frames, np.clip(of_frame, -_MAXIMUM_CHANGE, _MAXIMUM_CHANGE))
     seen, errors = fit.own.seen, fit.errors
