@@ -212,6 +212,12 @@ def test_targets_in_deep_lattices_are_read() -> None:
     assert counted(shown, detect(shown.image)) == (5, 0, 0)
 
 
+def test_targets_at_75_degrees_are_read() -> None:
+    size = {'width': 1600, 'height': 1066, 'targets': 8, 'dot_radius': 5.1, 'seed': 1}
+    shown = scene(tilt=75.0, polarity='bright', focal_length=8.0, **size)
+    assert counted(shown, detect(shown.image)) == (8, 0, 0)
+
+
 def test_a_grid_of_dots_is_no_target() -> None:
     y, x = np.mgrid[:600, :800]
     inside = np.hypot((x + 12) % 24 - 12, (y + 12) % 24 - 12)
