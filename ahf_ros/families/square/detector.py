@@ -7,7 +7,7 @@ their cells. Corners and centres are measured in the image as received, by edges
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import ceil, inf, isnan, log, log2
 from typing import Any
 
@@ -22,7 +22,7 @@ from ahf_ros.families.square.frames import Places, centres, side_lengths
 from ahf_ros.families.square.margins import decision_margins
 from ahf_ros.families.square.prints import lay_outlines, lay_prints
 from ahf_ros.families.square.quadrilaterals import find_quadrilaterals
-from ahf_ros.families.square.reading import MINIMUM_ODDS, read
+from ahf_ros.families.square.reading import MINIMUM_ODDS, NOTHING, Readings, read
 from ahf_ros.families.undecoded import undecoded
 from ahf_ros.prints.square import are_plain, words
 from ahf_ros.vision.frame import reduced
@@ -81,31 +81,31 @@ class SquareDetector(ExpectingDetector):
         groups = self.design
         levels = max(0, int(log2(max(min(gray.shape) / _SMALLEST_HALF, 1))))
         expected, everything = self.expected, self.settings.report_undecoded
-        corners, readings = [np.zeros((0, 4, 2))], [np.zeros((0, 6))]
+        found = [NOTHING]
         for level, half in enumerate(halved(gray, levels)):
-            found = find_quadrilaterals(half)
-            small = np.linalg.norm(found[:, 2] - found[:, 0], axis=1) < _SMALL
+            corners = find_quadrilaterals(half)
+            small = np.linalg.norm(corners[:, 2] - corners[:, 0], axis=1) < _SMALL
             if level == 0:
-                found[small] = lay_outlines(half, found[small])
+                corners[small] = lay_outlines(half, corners[small])
             else:  # where contours do as well, unless light, a lens or enlargement spreads
-                small &= ~_are_read(_enlarged(found, level), corners, readings)
-                found = np.concatenate([found, lay_outlines(half, found[small])])
-            found, read_as = _read(half, found, groups, expected, everything=everything)
-            corners.append(_enlarged(found, level))
-            readings.append(read_as)
-        places, rows = np.concatenate(corners), np.concatenate(readings)
-        found, read_as = _read(gray, _laid(gray, places, rows, groups), groups, expected)
-        read_as[:, 3] -= _FITTED
-        places, rows = np.concatenate([places, found]), np.concatenate([rows, read_as])
-        sure = rows[:, 3] > MINIMUM_ODDS
-        doubtful = everything & ~sure & (rows[:, 5] > 0)
-        together = _odds_together(rows[sure], _one_place(places[sure]), groups)
-        odds = np.concatenate([together, np.minimum(rows[doubtful, 3], MINIMUM_ODDS)])
-        places, rows = (np.concatenate([of[sure], of[doubtful]]) for of in (places, rows))
-        order = np.argsort(-odds, kind='stable')
-        order = order[owners(len(order), _one_place(places[order]))]
-        decoded = odds[order] > MINIMUM_ODDS
-        markers = _markers(places[order], rows[order], odds[order], decoded, groups)
+                small &= ~_are_read(_enlarged(corners, level), Readings.joined(found))
+                corners = np.concatenate([corners, lay_outlines(half, corners[small])])
+            of_half = read(half, corners, groups, expected, everything=everything)
+            found.append(replace(of_half, corners=_enlarged(of_half.corners, level)))
+        readings = Readings.joined(found)
+        laid = read(gray, _laid(gray, readings, groups), groups, expected)
+        readings = Readings.joined([readings, replace(laid, odds=laid.odds - _FITTED)])
+        certain = readings.odds > MINIMUM_ODDS
+        sure = readings.select(certain)
+        doubtful = readings.select(everything & ~certain & readings.whole)
+        odds = np.minimum(doubtful.odds, MINIMUM_ODDS)
+        odds = np.concatenate([_odds_together(sure, groups), odds])
+        readings = replace(Readings.joined([sure, doubtful]), odds=odds)
+        readings = readings.select(np.argsort(-odds, kind='stable'))
+        one_place = _one_place(readings.corners)
+        readings = readings.select(owners(len(readings.odds), one_place))
+        decoded = readings.odds > MINIMUM_ODDS
+        markers = _markers(readings, decoded, groups)
         return sorted_targets(
             it if is_decoded else undecoded(it)
             for it, is_decoded in zip(markers, decoded.tolist(), strict=True)
@@ -138,17 +138,14 @@ class SquareDetector(ExpectingDetector):
         return refined
 
 
-def _markers(
-    places: np.ndarray, rows: np.ndarray, odds: np.ndarray, decoded: np.ndarray, groups: Groups
-) -> list[SquareMarker]:
+def _markers(readings: Readings, decoded: np.ndarray, groups: Groups) -> list[SquareMarker]:
     """Return readings as markers, of the smallest dictionary that has all that are decoded."""
-    which, numbers, borders = rows[:, :3].T.astype(int)
+    which, numbers = readings.group, readings.number
     largest = [numbers[decoded & (which == index)].max(initial=0) for index in range(len(groups))]
-    deviations = _DRAFT_DEVIATION * side_lengths(places).mean(axis=1)
+    deviations = _DRAFT_DEVIATION * side_lengths(readings.corners).mean(axis=1)
     covariances = deviations[:, None, None] ** 2 * np.eye(2)
-    confidences = 1 / (1 + np.exp(-odds))
-    fields = _places(places, covariances, np.full(len(places), np.nan))
-    columns = (which, numbers, borders, confidences)
+    fields = _places(readings.corners, covariances, np.full(len(numbers), np.nan))
+    columns = (which, numbers, readings.border, 1 / (1 + np.exp(-readings.odds)))
     return [
         SquareMarker(
             id=number,
@@ -166,55 +163,34 @@ def _markers(
     ]
 
 
-def _read(
-    gray: np.ndarray,
-    corners: np.ndarray,
-    groups: Groups,
-    expected: frozenset[int],
-    *,
-    everything: bool = False,
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return the corners of readings, shape (k, 4, 2), and their columns, (k, 6)."""
-    found = read(gray, corners, groups, expected, everything=everything)
-    turned = (np.arange(4) - found.turn[:, None]) % 4
-    columns = (found.group, found.number, found.border, found.odds, found.others, found.whole)
-    return corners[found.quadrilateral[:, None], turned], np.stack(columns, axis=1)
-
-
 def _enlarged(corners: np.ndarray, level: int) -> np.ndarray:
     """Return corners in an image halved so often as they are in the image."""
     return (corners + 0.5) * 2**level - 0.5
 
 
-def _are_read(
-    places: np.ndarray, corners: Sequence[np.ndarray], readings: Sequence[np.ndarray]
-) -> np.ndarray:
+def _are_read(places: np.ndarray, readings: Readings) -> np.ndarray:
     """Return which quadrilaterals, shape (k, 4, 2), are where a marker was surely read, (k,)."""
-    sure = np.concatenate(corners)[np.concatenate(readings)[:, 3] > _SURE]
+    sure = readings.corners[readings.odds > _SURE]
     distances = np.linalg.norm(places.mean(axis=1)[:, None] - sure.mean(axis=1), axis=2)
     near = distances <= _SAME_PLACE * side_lengths(places).max(axis=1)[:, None]
     return near.any(axis=1)
 
 
-def _laid(
-    gray: np.ndarray, corners: np.ndarray, readings: np.ndarray, groups: Groups
-) -> np.ndarray:
+def _laid(gray: np.ndarray, readings: Readings, groups: Groups) -> np.ndarray:
     """Return the corners of prints that lie over the image where readings are doubtful."""
-    order = np.argsort(-readings[:, 3], kind='stable')
-    markers, one_place = readings[order, :2], _one_place(corners[order])
+    readings = readings.select(np.argsort(-readings.odds, kind='stable'))
+    group, number, one_place = readings.group, readings.number, _one_place(readings.corners)
 
     def same(index: int) -> np.ndarray:
-        return one_place(index) & (markers == markers[index]).all(axis=1)
+        return one_place(index) & (group == group[index]) & (number == number[index])
 
-    own = order[owners(len(order), same)]
-    own = own[readings[own, 3] <= MINIMUM_ODDS]
+    own = readings.select(owners(len(group), same) & (readings.odds <= MINIMUM_ODDS))
     parts: dict[int, list[tuple[np.ndarray, np.ndarray]]] = {}
-    group, number, border = readings[own, :3].T.astype(int)
-    for index, width in sorted(set(zip(group.tolist(), border.tolist(), strict=True))):
-        alike = (group == index) & (border == width)
-        cells = words(groups[index][-1])[number[alike]]
+    for index, width in sorted(set(zip(own.group.tolist(), own.border.tolist(), strict=True))):
+        alike = own.select((own.group == index) & (own.border == width))
+        cells = words(groups[index][-1])[alike.number]
         prints = ~np.pad(cells, ((0, 0), (width, width), (width, width)))
-        parts.setdefault(prints.shape[1], []).append((corners[own[alike]], prints))
+        parts.setdefault(prints.shape[1], []).append((alike.corners, prints))
     found = [np.zeros((0, 4, 2))]
     for of_size in parts.values():
         places, prints = map(np.concatenate, zip(*of_size, strict=True))
@@ -223,7 +199,7 @@ def _laid(
     return np.concatenate(found)
 
 
-def _odds_together(readings: np.ndarray, one_place: Rivals, groups: Groups) -> np.ndarray:
+def _odds_together(readings: Readings, groups: Groups) -> np.ndarray:
     """Return the logarithmic odds of the readings, shape (k,), as all of them show the groups.
 
     A group is there or not. One marker shows it, whichever it is, or different ones together,
@@ -233,20 +209,21 @@ def _odds_together(readings: np.ndarray, one_place: Rivals, groups: Groups) -> n
     group reads the same places, the surer one is there, and of several markers of a group in one
     place, as by borders of one and two cells, one is.
     """
-    group, number, _, of_group, others, _ = readings.T
-    lead, odds = np.empty((2, len(readings)))
+    group, number, of_group = readings.group, readings.number, readings.odds
+    one_place = _one_place(readings.corners)
+    lead, odds = np.empty((2, len(group)))
     for index, own in enumerate(of_group):
         near, alike = one_place(index), group == group[index]
         lead[index] = own - of_group[near & ~alike].max(initial=0.0)
         marker = of_group[near & alike & (number != number[index])].max(initial=-inf)
-        odds[index] = -np.logaddexp(-own, max(others[index], marker - own))
+        odds[index] = -np.logaddexp(-own, max(readings.others[index], marker - own))
     doubt = log(len(groups) ** _SEVERAL - 1) if len(groups) > 1 else -inf
     alone = log(len(groups) ** _ALONE - 1) if len(groups) > 1 else -inf
     against = np.full(len(odds), inf)
     for index, names in enumerate(groups):
         sizes = np.array([len(words(name)) for name in names])
         of_this = group == index
-        some = number[of_this].astype(int)
+        some = number[of_this]
         surest, whole, leading = np.zeros((3, sizes[-1]))
         most = np.where(are_plain(names[-1]), _OF_PLAIN, inf)
         np.maximum.at(surest, some, np.minimum(lead, odds)[of_this])

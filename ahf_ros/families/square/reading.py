@@ -15,7 +15,7 @@ References
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from math import log
 
@@ -26,6 +26,7 @@ from ahf_ros.families.square.frames import side_lengths, square_frames
 from ahf_ros.families.square.shapes import corner_odds, parallel_odds
 from ahf_ros.families.words import against as of_expected
 from ahf_ros.prints.square import borders, corner_counts, words
+from ahf_ros.vision.array_record import ArrayRecord
 from ahf_ros.vision.frame import project
 from ahf_ros.vision.logarithm import LOG_OFFSET
 from ahf_ros.vision.normal import exact_normal_integral
@@ -65,17 +66,38 @@ MINIMUM_ODDS = 2.2
 
 
 @dataclass(frozen=True, slots=True)
-class Readings:
-    """Markers that quadrilaterals were read as; all of shape (k,)."""
+class Readings(ArrayRecord):
+    """Markers that quadrilaterals were read as; all but corners of shape (k,)."""
 
-    quadrilateral: np.ndarray  # its index
+    corners: np.ndarray  # (k, 4, 2), px, from the one that is top left in the upright marker
     group: np.ndarray  # of dictionaries, its index
     number: np.ndarray  # ID
-    turn: np.ndarray  # index of the corner that is top left in the upright marker
     border: np.ndarray  # width of the border, cells
     odds: np.ndarray  # logarithmic, that it is a marker of the group, if the group is there
     others: np.ndarray  # logarithmic odds of other markers of the group against this one
     whole: np.ndarray  # whether its border is one of a marker, whatever is inside
+
+
+NOTHING = Readings(
+    corners=np.zeros((0, 4, 2)),
+    group=np.zeros(0, int),
+    number=np.zeros(0, int),
+    border=np.zeros(0, int),
+    odds=np.zeros(0),
+    others=np.zeros(0),
+    whole=np.zeros(0, bool),
+)
+
+
+@dataclass(frozen=True, slots=True)
+class _Evidence:
+    """What the cells of quadrilaterals within a border say; k of these, c cells in each."""
+
+    quadrilateral: np.ndarray  # (k,), its index
+    paper: np.ndarray  # (k, c), by how much the log odds of a marker grow where a cell is paper
+    ink: np.ndarray  # (k,), logarithmic odds of a marker where all cells are ink
+    square: np.ndarray  # (k,), logarithmic odds of square corners
+    whole: np.ndarray  # (k,), whether the border is whole, bool
 
 
 def read(
@@ -92,7 +114,7 @@ def read(
     IDs that are likely to be there; empty: all IDs are equally likely. Those with a whole border
     that are like none of the markers are among them if `everything` is asked for.
     """
-    found = [np.zeros((0, 8))]
+    found = [NOTHING]
     groups = groups if len(corners) else ()
     frames = square_frames(corners)
     bordered = np.flatnonzero(_dark_inside(gray, frames, _DEPTH))
@@ -109,55 +131,57 @@ def read(
         if not len(some):
             continue
         places = frames[some], corners[some], sizes[some]
-        evidence, against, square, whole, which = _evidence(gray, *places, cells, border)
-        which = some[which]
-        square += parallel[which]
-        for index, group in enumerate(groups):
-            if (cells, border) not in grids[index] or not len(which):
-                continue
-            prints, prior, few, drawn = _table(tuple(group))
-            odds = evidence @ prints
-            odds -= prior
-            if expected:
-                odds -= np.repeat(of_expected(np.arange(len(prior) // 4), expected), 4)
-            best = odds.argmax(axis=1)
-            of_cells = odds[np.arange(len(best)), best] + against - _DOUBT - few[best]
-            of_shape = square + drawn[best] - prior[best] - _FIGURES
-            total = -np.logaddexp(-of_cells, -of_shape)
-            likely = np.flatnonzero((total > _POSSIBLE) | everything & whole)
-            odds, best, total = odds[likely], best[likely], total[likely]
-            # A turn of the same marker is no other: some are symmetric.
-            number, turn = np.divmod(best, 4)
-            rows = np.arange(len(best))[:, None]
-            odds -= odds[rows, best[:, None]]
-            odds[rows, 4 * number[:, None] + np.arange(4)] = -np.inf
-            second = odds.max(axis=1, initial=-np.inf)
-            others = second + np.log(np.exp(odds - second[:, None]).sum(axis=1))
-            alike = np.full((2, len(best)), [[index], [border]])
-            columns = (
-                which[likely],
-                alike[0],
-                number,
-                turn,
-                alike[1],
-                total,
-                others,
-                whole[likely],
-            )
-            found.append(np.stack(columns, axis=1))
-    table = np.concatenate(found)
-    shown = (table[:, 5] > MINIMUM_ODDS) | (table[:, 6] < _CLEAR)
-    table = table[shown | everything & (table[:, 7] > 0)]
-    which, group, number, turn, widths = table[:, :5].T.astype(int)
+        seen = _evidence(gray, *places, cells, border)
+        if not len(seen.quadrilateral):
+            continue
+        which = some[seen.quadrilateral]
+        seen = replace(seen, quadrilateral=which, square=seen.square + parallel[which])
+        found += [
+            _likely(seen, corners, tuple(group), index, border, expected, everything=everything)
+            for index, group in enumerate(groups)
+            if (cells, border) in grids[index]
+        ]
+    readings = Readings.joined(found)
+    shown = (readings.odds > MINIMUM_ODDS) | (readings.others < _CLEAR)
+    return readings.select(shown | everything & readings.whole)
+
+
+def _likely(
+    seen: _Evidence,
+    corners: np.ndarray,
+    group: tuple[str, ...],
+    index: int,
+    border: int,
+    expected: frozenset[int],
+    *,
+    everything: bool,
+) -> Readings:
+    """Return what is likely to be a marker of a group, whose index and border are given."""
+    prints, prior, few, drawn = _table(group)
+    odds = seen.paper @ prints
+    odds -= prior
+    if expected:
+        odds -= np.repeat(of_expected(np.arange(len(prior) // 4), expected), 4)
+    best = odds.argmax(axis=1)
+    of_cells = odds[np.arange(len(best)), best] + seen.ink - _DOUBT - few[best]
+    of_shape = seen.square + drawn[best] - prior[best] - _FIGURES
+    total = -np.logaddexp(-of_cells, -of_shape)
+    likely = np.flatnonzero((total > _POSSIBLE) | everything & seen.whole)
+    odds, best = odds[likely], best[likely]
+    # A turn of the same marker is no other: some are symmetric.
+    number, turn = np.divmod(best, 4)
+    rows = np.arange(len(best))[:, None]
+    odds -= odds[rows, best[:, None]]
+    odds[rows, 4 * number[:, None] + np.arange(4)] = -np.inf
+    second = odds.max(axis=1, initial=-np.inf)
     return Readings(
-        quadrilateral=which,
-        group=group,
+        corners=corners[seen.quadrilateral[likely, None], (np.arange(4) - turn[:, None]) % 4],
+        group=np.full(len(best), index),
         number=number,
-        turn=turn,
-        border=widths,
-        odds=table[:, 5],
-        others=table[:, 6],
-        whole=table[:, 7] > 0,
+        border=np.full(len(best), border),
+        odds=total[likely],
+        others=second + np.log(np.exp(odds - second[:, None]).sum(axis=1)),
+        whole=seen.whole[likely],
     )
 
 
@@ -212,12 +236,9 @@ def _evidence(
     sizes: np.ndarray,
     cells: int,
     border: int,
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Return what the cells of quadrilaterals within a border say, and indices of these.
+) -> _Evidence:
+    """Return what the cells of quadrilaterals within a border say.
 
-    It is by how much the logarithmic odds of a marker grow where a cell is paper, shape
-    (k, cells^2), what they are where all cells are ink, (k,), those of square corners, (k,), and
-    whether the border is whole, bool, (k,).
     Those with small cells are there twice, once as in a sharp image, and those with large cells
     once by the darkest part of each, as where light has spread from paper over ink.
     """
@@ -267,7 +288,8 @@ def _evidence(
     square = np.clip(corner_odds(bright, depths, _SHARPNESS), -_COVERED, _COVERED).sum(axis=1)
     rare = spreads[which]
     whole = (around > _WHOLE) & (square > 0)
-    return paper.astype(np.float32), inside - rare, square - rare, whole, tried[which]
+    paper = paper.astype(np.float32)
+    return _Evidence(tried[which], paper, inside - rare, square - rare, whole)
 
 
 @dataclass(frozen=True, slots=True)
