@@ -8,11 +8,13 @@ detectors read pictures of three makers where readings begin to fail
 (`support.pictures.conditions.pictures`), and the table shows how often what they state is right:
 what is reported, and undecoded targets whose likely ID is uncertain, from a confidence of 0.5 on.
 `off` is by how much that is more than 3 % and two standard deviations of so many draws away.
+With --calibrate, what they state is fitted to such pictures (`ahf_ros.families.calibration`).
 Seeds from 101 on are for tests, those below for development.
 
     python -m benchmarks.confidence [--family ring] [--seeds 101 102]
     python -m benchmarks.confidence --family gsi --fit 1 2 3 4
     python -m benchmarks.confidence --diagram dots gsi [--seeds 101]
+    python -m benchmarks.confidence --calibrate 1 2 3
 """
 
 from __future__ import annotations
@@ -32,9 +34,11 @@ from tempfile import TemporaryDirectory
 from typing import NamedTuple
 
 import numpy as np
+from scipy.optimize import minimize
 
 from ahf_ros.base.target import UNDECODED, Target, UndecodedTarget
-from ahf_ros.families import DetectorSettings, create_detector
+from ahf_ros.families import DetectorSettings, calibration, create_detector
+from ahf_ros.families.calibration import KNOTS
 from ahf_ros.families.dots import rings as dots
 from ahf_ros.families.dots.detector import find_rings
 from ahf_ros.families.gsi import hypotheses as gsi
@@ -87,6 +91,7 @@ RARE = 0.3
 _PRIOR = 1.0  # inverse variance of scaled weights
 _ITERATIONS = 3000
 _NO_SPREAD = 1e-9
+_OF_STEPS, _LEAST_STEP = 2.0, 0.05  # prior deviation and least of steps of odds between knots
 _MINIMUM_MARGIN = np.log1p(2.0)  # of readings that count: others are not certain in any case
 _HIDDEN, _TRACE = 0.03, -1.4  # share of the band, and feature of arcs, without a trace of covers
 
@@ -361,15 +366,18 @@ def reliability(family: str, seeds: Sequence[int]) -> list[str]:
 
 
 def write_weights(
-    family: str, seeds: Sequence[int], weights: Mapping[str, np.ndarray], path: Path
+    purpose: str,
+    arguments: str,
+    seeds: Sequence[int],
+    weights: Mapping[str, np.ndarray],
+    path: Path,
 ) -> None:
     """Replace one set of a file, and say from which seeds and at which commit it was fitted."""
     sets = json.loads(path.read_text(encoding='utf-8'))
     command = ['git', 'describe', '--always', '--dirty']
     commit = subprocess.run(command, cwd=path.parent, check=True, capture_output=True, text=True)
-    sets['confidence' if family == 'ring' else f'{family}_confidence'].update(
-        command=f'python -m benchmarks.confidence --family {family} '
-        f'--fit {" ".join(map(str, seeds))}',
+    sets[purpose].update(
+        command=f'python -m benchmarks.confidence {arguments} {" ".join(map(str, seeds))}',
         seeds=list(seeds),
         commit=commit.stdout.strip(),
         **{name: values.tolist() for name, values in weights.items()},
@@ -377,16 +385,16 @@ def write_weights(
     text = json.dumps(sets, indent=2)
     text = re.sub(r'\[\s+([^]]*?)\s+\]', lambda row: f'[{" ".join(row[1].split())}]', text)
     path.write_text(text + '\n', encoding='utf-8')
-    print(f'{path}: weights of {family}')
+    print(f'{path}: {purpose}')
 
 
 def read(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
-    """Return the stated confidences of the readings of a scene, and which are right, (k,) each."""
+    """Return the confidences of the likely IDs of a scene, and which are right, (k,) each."""
     settings = replace(scene.settings, report_undecoded=True)
     found = [
         (it.x, it.y, likely, it.confidence)
         for it in create_detector(settings=settings)(scene.image)
-        if (likely := _likely_id(it)) != UNDECODED and it.confidence >= STATED[0]
+        if (likely := _likely_id(it)) != UNDECODED
     ]
     x, y, ids, stated = np.array(found).reshape(-1, 4).T
     true = np.array([(of.x, of.y, of.id) for of in scene.truth]).reshape(-1, 3)
@@ -403,19 +411,47 @@ def _likely_id(target: Target) -> int:
 
 def diagram(families: Sequence[str], seeds: Sequence[int]) -> list[str]:
     """Return the lines of the table of families by maker, and of all makers."""
-    parts: dict[tuple[str, str], list[np.ndarray]] = {}
-    for family, maker, seed in product(families, MAKERS, seeds):
-        for scene in pictures(family, maker, seed):
-            stated = np.stack(read(scene))
-            for of in (maker, 'all'):
-                parts.setdefault((family, of), []).append(stated)
     rows = []
-    for (family, maker), some in sorted(parts.items()):
-        stated, right = np.concatenate(some, axis=1)
-        for label, readings in _by_class(stated, right, STATED):
-            rows.append((family, maker, label, *shares(*readings)))
+    for family in families:
+        makers, stated, right = gathered(partial(of_makers, [family]), seeds)
+        for maker in ('all', *MAKERS):
+            some = (makers == maker) | (maker == 'all')
+            for label, readings in _by_class(stated[some], right[some], STATED):
+                rows.append((family, maker, label, *shares(*readings)))
     head = ('family', 'maker', 'confidence', 'readings', 'stated', 'right', 'error', 'off')
     return report.table(head, rows)
+
+
+def of_makers(families: Sequence[str], seed: int) -> Parts:
+    """Yield maker, stated confidences and rightness of the likely IDs in each picture."""
+    for family, maker in product(families, MAKERS):
+        for scene in pictures(family, maker, seed):
+            stated, right = read(scene)
+            yield np.full(len(right), maker), stated, right
+
+
+def calibrated(kind: str, seeds: Sequence[int]) -> np.ndarray:
+    """Return the probabilities at all knots but the last one for a kind of detector, shape (3,).
+
+    They have the highest likelihood under a weak prior for those that a detector is sure of, and
+    are no higher than these: in photographs by strangers, such are right (`benchmarks.makers`).
+    """
+    _, stated, right = gathered(partial(of_makers, [kind]), seeds)
+    sure = calibration.sure_of(stated, kind)
+    used = (sure > KNOTS[0]) & (sure < KNOTS[-1])
+    odds, knots = calibration.log_odds(sure[used]), calibration.log_odds(KNOTS)
+
+    def values(steps: np.ndarray) -> np.ndarray:
+        return np.minimum(knots[-1] - np.append(np.cumsum(steps[::-1])[::-1], 0.0), knots)
+
+    def unlikely(steps: np.ndarray) -> float:
+        of = np.interp(odds, knots, values(steps))
+        of_prior = ((steps - np.diff(knots)) / _OF_STEPS) ** 2 / 2
+        return float((np.logaddexp(0, of) - right[used] * of).sum() + of_prior.sum())
+
+    bounds = [(_LEAST_STEP, None)] * (len(KNOTS) - 1)
+    steps = minimize(unlikely, np.diff(knots), bounds=bounds).x
+    return np.round(1 / (1 + np.exp(-values(steps)[:-1])), 3)
 
 
 def shares(stated: np.ndarray, right: np.ndarray) -> tuple[int, str, str, str, str]:
@@ -433,13 +469,22 @@ def main() -> None:
     made.add_argument('--family', choices=KINDS, default='ring')
     made.add_argument('--fit', type=int, nargs='+', metavar='SEED', help='fit the weights anew')
     made.add_argument('--diagram', nargs='*', choices=FIRST, help='families; all if none is named')
+    made.add_argument(
+        '--calibrate', type=int, nargs='+', metavar='SEED', help='fit what is stated anew'
+    )
     options = report.parsed(made)
     if options.diagram is not None:
         print('\n'.join(diagram(options.diagram or FIRST, options.seeds)))
+    elif options.calibrate:
+        seeds = options.calibrate
+        values = {kind: calibrated(kind, seeds) for kind in calibration.KINDS}
+        write_weights('calibration', '--calibrate', seeds, values, calibration.WEIGHTS)
     elif options.fit:
         kind = KINDS[options.family]
         weights = kind.fitted(*gathered(kind.readings, options.fit))
-        write_weights(options.family, options.fit, weights, kind.weights)
+        purpose = 'confidence' if options.family == 'ring' else f'{options.family}_confidence'
+        arguments = f'--family {options.family} --fit'
+        write_weights(purpose, arguments, options.fit, weights, kind.weights)
     else:
         print('\n'.join(reliability(options.family, options.seeds)))
 

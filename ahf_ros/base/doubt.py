@@ -9,11 +9,10 @@ from ahf_ros.base.text import counted, listed
 DOUBTFUL_BELOW = 0.95
 """Confidence below which a decoded target counts as doubtful."""
 
-_PROBABILITIES = 'probabilities are reported from 0.75 on'
+_PROBABILITIES = 'probabilities are reported from {} on'
 _MEANING = {
-    'ring': _PROBABILITIES,
-    'cctag': _PROBABILITIES,
-    'several': _PROBABILITIES,
+    **dict.fromkeys(('ring', 'cctag', 'several'), _PROBABILITIES.format(0.75)),
+    **dict.fromkeys(('gsi', 'dots', 'aruco', 'apriltag', 'square'), _PROBABILITIES.format(0.8)),
     'traditional': 'no probability: how clearly the band is read',
     'gsi_published': 'no probability: how exactly the design fits',
     'dots_published': 'no probability: how many samples agree, from 0.75 on',

@@ -79,7 +79,7 @@ def test_targets_are_identified_and_placed(family: str, changes: dict, bound: fl
     assert counted(shown, found) == (len(shown.targets), 0, 0)
     assert np.sqrt((errors(shown, found) ** 2).mean()) < bound
     assert [it.code for it in found] == [it.code for it in shown.targets]
-    assert all(0.95 <= target.confidence <= 1 for target in found)
+    assert all(0.8 <= target.confidence <= 1 for target in found)
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,80 @@
+"""Confidences as probabilities: how often readings are right that a detector is as sure of.
+
+A detector decides by how sure it is, and states a probability. The logarithmic odds of the latter
+are fitted at the `KNOTS` to pictures of three makers where readings begin to fail (Platt [1]_ fits
+one line). They are straight between them and rise, so that no decision changes, and are never
+higher than the detector is sure: rendered pictures flatter, and in photographs by strangers rings
+are right as often as they are sure. Beyond the last knot hardly any reading is wrong, and the
+detector is taken at its word, as it is below the first one. `benchmarks.confidence` fits them, and
+shows how far they can be trusted.
+
+References
+----------
+.. [1] Platt, Probabilistic outputs for support vector machines and comparisons to regularized
+   likelihood methods, Advances in Large Margin Classifiers, MIT Press, 1999, 61-74.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from ahf_ros.base.target import Target, UndecodedTarget
+from ahf_ros.vision.logistic import read_weights
+
+KINDS = ('gsi', 'dots')
+"""Kinds of detectors that are surer than they are right; others are at most as sure."""
+
+KNOTS = np.array([0.02, 0.5, 0.95, 0.99])
+"""How sure a detector is where its probabilities are fitted, all but the last one."""
+
+WEIGHTS = Path(__file__).with_name('calibration.json')
+"""The data file, which says what made it."""
+
+
+def log_odds(shares: np.ndarray) -> np.ndarray:
+    """Return the logarithmic odds of probabilities, those of 0 and 1 being -37 and 37."""
+    shares = np.clip(shares, 1e-16, 1 - 1e-16)
+    return np.asarray(np.log(shares) - np.log1p(-shares))
+
+
+_CURVES = {
+    kind: log_odds(np.append(values, KNOTS[-1]))
+    for kind, values in zip(KINDS, read_weights(WEIGHTS, 'calibration', *KINDS), strict=True)
+}
+_ODDS = log_odds(KNOTS)
+
+
+def stated(targets: Iterable[Target], kind: str) -> list[Target]:
+    """Return targets with the probability that their ID, or their likely one, is right.
+
+    Parameters
+    ----------
+    targets : iterable of Target
+        Their confidence is how sure the detector is of the ID, from 0 to 1.
+    kind : str
+        One of `KINDS`.
+    """
+    every = list(targets)
+    sure = np.array([it.confidence for it in every])
+    probable = _between(sure, _ODDS, _CURVES[kind]).tolist()
+    return [
+        it
+        if value == it.confidence or (isinstance(it, UndecodedTarget) and it.reason == 'unread')
+        else replace(it, confidence=value)
+        for it, value in zip(every, probable, strict=True)
+    ]
+
+
+def sure_of(probable: np.ndarray, kind: str) -> np.ndarray:
+    """Return how sure a detector of a kind is of what it states, shape (k,)."""
+    return _between(probable, _CURVES[kind], _ODDS)
+
+
+def _between(shares: np.ndarray, of: np.ndarray, to: np.ndarray) -> np.ndarray:
+    odds = log_odds(shares)
+    within = (odds > of[0]) & (odds < of[-1])
+    return np.where(within, 1 / (1 + np.exp(-np.interp(odds, of, to))), shares)
