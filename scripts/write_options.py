@@ -14,8 +14,6 @@ OWN = ('detector',)  # an argument of its own, which may be a function as well
 HEAD = '''\
 """The types of settings that functions take by keyword; scripts/write_options.py writes them."""
 
-from __future__ import annotations
-
 from typing import Literal, TypedDict
 
 

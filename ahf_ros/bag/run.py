@@ -308,12 +308,14 @@ class _Answering:
     ) -> Iterator[Output]:
         """Yield answers to the images that a remark is about, if they get no other.
 
-        An image that was not read is that of the message; one that is no message has no header.
+        An image that was not read is that of the message; what is no message, or one of a type
+        without a header, gets none.
         """
         headers = remark.items
         if remark.kind == Kind.REFUSED and not headers:
             with suppress(ValueError):
-                headers = (self._sent(message).header,)
+                sent = self._sent(message)
+                headers = (sent.header,) if hasattr(sent, 'header') else ()
         for header in headers:
             status, family = STATUS[remark.kind], self._family
             yield self._output(
