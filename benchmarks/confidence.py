@@ -52,6 +52,7 @@ from ahf_ros.prints.gsi import point_family
 from ahf_ros.prints.ring import RingPrint, canonical
 from ahf_ros.scenes.scene import Rendering, render
 from ahf_ros.vision.image import as_gray
+from ahf_ros.vision.logistic import log_odds, probability
 from ahf_ros.vision.pyramid import image_pyramid
 from benchmarks import report
 from support.pictures.conditions import COMMON, FIRST, FOREIGN, MAKERS, Scene, pictures, scenes
@@ -221,8 +222,8 @@ def rising_regression(
     weights = ahead = np.zeros(basis.shape[1])
     momentum = 1.0
     for _ in range(_ITERATIONS):
-        probability = 1 / (1 + np.exp(-np.clip(basis @ ahead, -30, 30)))
-        gradient = basis.T @ (counts * (probability - right)) + prior * ahead
+        stated = probability(np.clip(basis @ ahead, -30, 30))
+        gradient = basis.T @ (counts * (stated - right)) + prior * ahead
         after = ahead - gradient / steepest
         after[1:] = np.maximum(after[1:], 0)
         faster = (1 + np.sqrt(1 + 4 * momentum**2)) / 2
@@ -334,9 +335,9 @@ def logistic_regression(features: np.ndarray, right: np.ndarray) -> np.ndarray:
     prior = np.diag([0.0] + [1.0] * features.shape[1])
     weights = np.zeros(basis.shape[1])
     for _ in range(100):
-        probability = 1 / (1 + np.exp(-basis @ weights))
-        gradient = basis.T @ (probability - right) + prior @ weights
-        curvature = (basis.T * (probability * (1 - probability))) @ basis + prior
+        stated = probability(basis @ weights)
+        gradient = basis.T @ (stated - right) + prior @ weights
+        curvature = (basis.T * (stated * (1 - stated))) @ basis + prior
         weights -= np.linalg.solve(curvature, gradient)
     slopes = weights[1:] / spread
     return np.concatenate([[weights[0] - slopes @ mean], slopes])
@@ -439,7 +440,7 @@ def calibrated(kind: str, seeds: Sequence[int]) -> np.ndarray:
     _, stated, right = gathered(partial(of_makers, [kind]), seeds)
     sure = calibration.sure_of(stated, kind)
     used = (sure > KNOTS[0]) & (sure < KNOTS[-1])
-    odds, knots = calibration.log_odds(sure[used]), calibration.log_odds(KNOTS)
+    odds, knots = log_odds(sure[used]), log_odds(KNOTS)
 
     def values(steps: np.ndarray) -> np.ndarray:
         return np.minimum(knots[-1] - np.append(np.cumsum(steps[::-1])[::-1], 0.0), knots)
@@ -451,7 +452,7 @@ def calibrated(kind: str, seeds: Sequence[int]) -> np.ndarray:
 
     bounds = [(_LEAST_STEP, None)] * (len(KNOTS) - 1)
     steps = minimize(unlikely, np.diff(knots), bounds=bounds).x
-    return np.round(1 / (1 + np.exp(-values(steps)[:-1])), 3)
+    return np.round(probability(values(steps)[:-1]), 3)
 
 
 def shares(stated: np.ndarray, right: np.ndarray) -> tuple[int, str, str, str, str]:

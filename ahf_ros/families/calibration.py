@@ -23,7 +23,7 @@ from pathlib import Path
 import numpy as np
 
 from ahf_ros.base.target import Target, UndecodedTarget
-from ahf_ros.vision.logistic import read_weights
+from ahf_ros.vision.logistic import log_odds, probability, read_weights
 
 KINDS = ('gsi', 'dots')
 """Kinds of detectors that are surer than they are right; others are at most as sure."""
@@ -33,12 +33,6 @@ KNOTS = np.array([0.02, 0.5, 0.95, 0.99])
 
 WEIGHTS = Path(__file__).with_name('calibration.json')
 """The data file, which says what made it."""
-
-
-def log_odds(shares: np.ndarray) -> np.ndarray:
-    """Return the logarithmic odds of probabilities, those of 0 and 1 being -37 and 37."""
-    shares = np.clip(shares, 1e-16, 1 - 1e-16)
-    return np.asarray(np.log(shares) - np.log1p(-shares))
 
 
 _CURVES = {
@@ -77,4 +71,4 @@ def sure_of(probable: np.ndarray, kind: str) -> np.ndarray:
 def _between(shares: np.ndarray, of: np.ndarray, to: np.ndarray) -> np.ndarray:
     odds = log_odds(shares)
     within = (odds > of[0]) & (odds < of[-1])
-    return np.where(within, 1 / (1 + np.exp(-np.interp(odds, of, to))), shares)
+    return np.where(within, probability(np.interp(odds, of, to)), shares)

@@ -35,15 +35,20 @@ _DEGENERATE = 1e-6  # px^4, smallest determinant of a covariance, of a line
 
 
 def whole_dots(
-    pyramid: ImagePyramid, min_radius: float, max_radius: float, polarities: Sequence[int]
+    pyramid: ImagePyramid,
+    min_radius: float,
+    max_radius: float,
+    polarities: Sequence[int],
+    *,
+    levels: int = _LEVELS,
 ) -> Dots:
     """Return the dots with a whole outline, without duplicates, to about half a pixel.
 
     The radii are bounds of the semi-major axis, px of the image. Dark dots have the polarity 1,
-    bright ones -1.
+    bright ones -1. Outlines are followed on so many levels of the pyramid, the finest first.
     """
     found = [NO_DOTS]
-    for level, edges in enumerate(pyramid.edges[:_LEVELS], start=1):
+    for level, edges in enumerate(pyramid.edges[:levels], start=1):
         dots = whole_outlines(edges, min_radius / 2**level, max_radius / 2**level)
         dots = resized(pyramid.logs[level], dots.select(np.isin(dots.polarity, polarities)))
         frames = frame.enlarged(dots.frames, level)

@@ -24,7 +24,24 @@ def logistic(features: np.ndarray, weights: np.ndarray) -> np.ndarray:
     array([0.5])
     """
     odds = np.clip(weights[0] + features @ weights[1:], -_MAXIMUM_ODDS, _MAXIMUM_ODDS)
-    return 1 / (1 + np.exp(-odds))
+    return probability(odds)
+
+
+def probability(odds: np.ndarray) -> np.ndarray:
+    """Return the probabilities of logarithmic odds, of their shape.
+
+    Examples
+    --------
+    >>> probability(np.array([0.0, log_odds(np.array(0.9))])).round(3)
+    array([0.5, 0.9])
+    """
+    return np.asarray(1 / (1 + np.exp(-odds)))
+
+
+def log_odds(shares: np.ndarray) -> np.ndarray:
+    """Return the logarithmic odds of probabilities, those of 0 and 1 being -37 and 37."""
+    shares = np.clip(shares, 1e-16, 1 - 1e-16)
+    return np.asarray(np.log(shares) - np.log1p(-shares))
 
 
 def read_weights(path: Path, purpose: str, *names: str) -> tuple[np.ndarray, ...]:

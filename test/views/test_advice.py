@@ -54,7 +54,7 @@ def test_large_targets_that_are_far_from_each_other_are_told() -> None:
         (
             {'family': 'gsi', 'dot_radius': 1.5, 'targets': 6},
             {'family': 'gsi'},
-            [r'[56] dots of 1\.[34] px are too small: 2\.5 px would do'],
+            [r'[56] dots of 1\.3 px are too small: 2\.5 px would do'],
         ),
         (
             {},

@@ -154,12 +154,12 @@ def _aligned(
         rays = robust_rays(seen, inks[0], outlier)
         change, normal = _changed(rays, inks, frames, size, edges, prior)
         frames = frame.moved(frames, change[:, :7])
-        narrow, of_edges = family.narrow * size, edges + change[:, 7:]
-        of_edges[:, 1] = edges[:, 1] * np.exp(change[:, 8])
-        shift, blur = MAXIMUM_SHIFT * narrow, np.maximum(_SOFTEST * narrow, _SHARPEST)
-        (least, most), none = _SHARPENINGS, 0 * narrow
-        lowest = np.array([-shift, none + _SHARPEST, none + least])
-        edges = of_edges.clip(lowest.T, np.array([shift, blur, none + most]).T)
+        narrow, (shift, blur, sharpening) = family.narrow * size, edges.T
+        most, softest = MAXIMUM_SHIFT * narrow, np.maximum(_SOFTEST * narrow, _SHARPEST)
+        shift = (shift + change[:, 7]).clip(-most, most)
+        blur = (blur * np.exp(change[:, 8])).clip(_SHARPEST, softest)
+        sharpening = (sharpening + change[:, 9]).clip(*_SHARPENINGS)
+        edges = np.stack([shift, blur, sharpening], axis=1)
     covariance = frame.centre_covariance(frames, np.linalg.inv(normal)[:, :2, :2])
     seen = lit(gray, frames, lights, count)
     rays = Rays.of(seen, rings_along(family, ids, frame.mean_radii(frames), *edges.T)[0])

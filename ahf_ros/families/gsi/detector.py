@@ -129,9 +129,8 @@ def find_hypotheses(
     looked for.
     """
     kind = (*settings.radii, settings.polarities)
-    whole = whole_dots(pyramid, *kind)
-    # Outlines of the coarser edges are too inexact for the homography of a template.
-    whole = resized(pyramid.gray, whole.select(whole.share == 1))
+    # Outlines of coarser edges are too inexact for the homography of a template.
+    whole = resized(pyramid.gray, whole_dots(pyramid, *kind, levels=1))
     first = read_targets(pyramid, whole, code, NO_HYPOTHESES, expected, obvious=True)
     certain = first.select(resolve(first, code, OBVIOUS))
     places, radii = _printed(certain.words, code, certain.scale)

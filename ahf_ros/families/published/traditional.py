@@ -37,6 +37,7 @@ from ahf_ros.vision.circle_fit import fit_circles, fit_dots
 from ahf_ros.vision.ellipse_targets import targets_from_frames
 from ahf_ros.vision.frame import affine_frames, circle_points, ellipse_axes, project
 from ahf_ros.vision.image import as_gray, check_image, stretched_to_8_bit
+from ahf_ros.vision.logistic import probability
 from ahf_ros.vision.outlines import measured
 from ahf_ros.vision.sampling import sample, within
 
@@ -278,7 +279,7 @@ def _read_by_level(
     words = (means > 0.5) @ (1 << np.arange(code.bits))
     spread = np.maximum(deviation, _MINIMUM_DEVIATION)[:, None]
     odds = np.abs(2 * means - 1) / (2 * spread**2)
-    certainty = np.prod(1 / (1 + np.exp(-odds)), axis=1)
+    certainty = np.prod(probability(odds), axis=1)
     whole = clear & (np.abs(means - 0.5).min(axis=1) > _MINIMUM_CLARITY)
     whole &= coherence > _MINIMUM_COHERENCE
     certainty = np.where(whole, certainty, 0.0)

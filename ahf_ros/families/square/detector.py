@@ -27,6 +27,7 @@ from ahf_ros.families.undecoded import undecoded
 from ahf_ros.prints.square import are_plain, words
 from ahf_ros.vision.frame import reduced
 from ahf_ros.vision.image import as_gray, check_image
+from ahf_ros.vision.logistic import probability
 from ahf_ros.vision.pyramid import halved
 
 # Of a centre from contours where nothing else can be fitted, in sides: on paper with waves of 0.5
@@ -145,7 +146,7 @@ def _markers(readings: Readings, decoded: np.ndarray, groups: Groups) -> list[Sq
     deviations = _DRAFT_DEVIATION * side_lengths(readings.corners).mean(axis=1)
     covariances = deviations[:, None, None] ** 2 * np.eye(2)
     fields = _places(readings.corners, covariances, np.full(len(numbers), np.nan))
-    columns = (which, numbers, readings.border, 1 / (1 + np.exp(-readings.odds)))
+    columns = (which, numbers, readings.border, probability(readings.odds))
     return [
         SquareMarker(
             id=number,
