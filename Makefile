@@ -128,7 +128,7 @@ clean:
 
 # The modules are used where they are. The pip that comes with Python 3.11 takes twice as long as
 # today's to choose versions.
-$(INSTALLED): pyproject.toml setup.py package.xml
+$(INSTALLED): pyproject.toml setup.py package.xml scripts/build_kernels.py $(wildcard ahf_ros/kernels/*)
 	@$(PYTHON) scripts/prerequisites.py
 	@echo 'Setting up $(VENV): numpy, OpenCV and what else the command line needs.'
 	$(PYTHON) -m venv $(VENV)

@@ -103,7 +103,7 @@ class CMakeBuild(build_ext):
             environment['AMENT_PREFIX_PATH'] = environment['CMAKE_PREFIX_PATH'] = str(prefix)
         configure = [
             'cmake', '-S', str(HERE), '-B', str(work / 'cmake'), '-G', 'Ninja',
-            '-DCMAKE_BUILD_TYPE=Release', '-DBUILD_TESTING=OFF',
+            '-DCMAKE_BUILD_TYPE=Release', '-DBUILD_TESTING=OFF', '-DAHF_ROS_KERNELS=OFF',
             f'-DCMAKE_INSTALL_PREFIX={stage}',
             f'-DPython3_EXECUTABLE={sys.executable}',
             f'-DPYTHON_INSTALL_DIR={SITE.as_posix()}',

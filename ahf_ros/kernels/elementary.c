@@ -1,0 +1,28 @@
+/* Elementary functions of arrays. */
+
+#include "elementary.h"
+#include "kernels.h"
+
+void exponentials(count n, const double x[n], double y[n])
+{
+    for (count i = 0; i < n; i++)
+        y[i] = exponential(x[i]);
+}
+
+void logarithms(count n, const double x[n], double y[n])
+{
+    for (count i = 0; i < n; i++)
+        y[i] = logarithm(x[i]);
+}
+
+void hyperbolic_tangents(count n, const double x[n], double y[n])
+{
+    for (count i = 0; i < n; i++)
+        y[i] = hyperbolic_tangent(x[i]);
+}
+
+void normal_shares(count n, const double x[n], double y[n])
+{
+    for (count i = 0; i < n; i++)
+        y[i] = normal_share(x[i]);
+}
