@@ -26,7 +26,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 HEADER = Path(__file__).with_name('kernels.h')
 SUFFIX = {'darwin': '.dylib', 'win32': '.dll'}.get(sys.platform, '.so')
@@ -60,10 +59,18 @@ class Parameter:
     given: bool  # or else a count or a result
     sides: tuple[str, ...]  # of an array; names of counts, or numbers
 
+    @cached_property
+    def dtype(self) -> np.dtype[Any]:
+        """What numpy calls the type."""
+        return NUMBERS[self.kind][0]
+
     @staticmethod
     def parsed(text: str) -> Parameter:
         """Return the parameter that a declaration has."""
-        constant, kind, name, shape = _PARAMETER.fullmatch(text.strip()).groups()  # type: ignore[union-attr]
+        parts = _PARAMETER.fullmatch(text.strip())
+        if not parts or parts[2] not in (*NUMBERS, 'count'):
+            raise ValueError(f'the parameter is {text.strip()}, accepted is TYPE name[count]')
+        constant, kind, name, shape = parts.groups()
         sides = tuple(re.findall(r'\w+', shape))
         return Parameter(name, kind, bool(constant) or (not sides and kind != 'count'), sides)
 
@@ -111,64 +118,78 @@ class Kernel:
         return function
 
     @cached_property
-    def _given(self) -> list[Parameter]:
-        return [each for each in self.parameters if each.given]
+    def _plan(self) -> tuple[list[Parameter], list[Parameter], dict[str, int]]:
+        """The arguments; the results; and the sizes that shapes state as numbers."""
+        given = [each for each in self.parameters if each.given]
+        results = [each for each in self.parameters if not each.given and each.kind != 'count']
+        numbers = {
+            side: int(side) for each in self.parameters for side in each.sides if side.isdigit()
+        }
+        return given, results, numbers
 
-    def __call__(self, *values: ArrayLike, **counts: int) -> Any:
+    def __call__(self, *values: Any, **counts: int) -> Any:
         """Call the kernel."""
-        if len(values) != len(self._given):
-            names = ', '.join(each.name for each in self._given)
+        given, results, numbers = self._plan
+        if len(values) != len(given):
+            names = ', '.join(each.name for each in given)
             raise TypeError(
                 f'the kernel {self.name} has {len(values)} arguments, accepted are {names}'
             )
-        sizes = dict(counts)
-        arguments: dict[str, Any] = {}
-        for each, value in zip(self._given, values, strict=True):
-            arguments[each.name] = self._array(each, value, sizes) if each.sides else value
-        results = []
-        for each in self.parameters:
-            if each.kind == 'count':
-                arguments[each.name] = sizes[each.name]
-            elif not each.given:
-                shape = [sizes[side] if side in sizes else int(side) for side in each.sides]
-                result = np.empty(shape, NUMBERS[each.kind][0])
-                results.append(result)
-                arguments[each.name] = result
+        # Kernels are called often for small arrays: here is no call that can be spared.
+        sizes, taken = numbers | counts, {}
+        for each, value in zip(given, values, strict=True):
+            if each.sides:
+                if not (
+                    type(value) is np.ndarray
+                    and value.dtype is each.dtype
+                    and value.flags.c_contiguous
+                ):
+                    value = _as_declared(value, each, self.name)
+                shape = value.shape
+                if len(shape) != len(each.sides):
+                    raise self._refusal(each, value, {})
+                for side, size in zip(each.sides, shape, strict=True):
+                    if side not in sizes:
+                        sizes[side] = size
+                    elif sizes[side] != size:
+                        raise self._refusal(each, value, sizes)
+            taken[each.name] = value
+        for each in results:
+            taken[each.name] = np.empty([sizes[side] for side in each.sides], each.dtype)
         if 0 in sizes.values():
-            for result in results:
-                result.fill(0)
+            for each in results:
+                taken[each.name].fill(0)
         else:
+            taken |= sizes
             self._function(
-                *(
-                    arguments[each.name].ctypes.data if each.sides else arguments[each.name]
+                *[
+                    taken[each.name].__array_interface__['data'][0]
+                    if each.sides
+                    else taken[each.name]
                     for each in self.parameters
-                )
+                ]
             )
-        return results[0] if len(results) == 1 else tuple(results)
+        if len(results) == 1:
+            return taken[results[0].name]
+        return tuple([taken[each.name] for each in results])
 
-    def _array(self, each: Parameter, value: ArrayLike, sizes: dict[str, int]) -> np.ndarray:
-        """Return an argument as the kernel takes it; its sides are added to the sizes."""
-        array, dtype = np.asarray(value), NUMBERS[each.kind][0]
-        if array.dtype != dtype and not np.can_cast(array.dtype, dtype, 'same_kind'):
-            raise TypeError(
-                f'{each.name} of the kernel {self.name} has the type {array.dtype}, '
-                f'accepted is {dtype}'
-            )
-        agree = array.ndim == len(each.sides)
-        for side, size in zip(each.sides, array.shape, strict=False):
-            agree &= size == (int(side) if side.isdigit() else sizes.setdefault(side, size))
-        if not agree:
-            shape = ''.join(f'[{side}]' for side in each.sides)
-            known = ', '.join(
-                f'{it} = {sizes[it]}' for it in dict.fromkeys(each.sides) if it in sizes
-            )
-            if array.ndim != len(each.sides):
-                known = ''
-            raise ValueError(
-                f'{each.name} of the kernel {self.name} has the shape {array.shape}, '
-                f'accepted is {shape}{" with " if known else ""}{known}'
-            )
-        return np.ascontiguousarray(array, dtype)
+    def _refusal(self, each: Parameter, value: np.ndarray, sizes: dict[str, int]) -> ValueError:
+        known = ', '.join(f'{it} = {sizes[it]}' for it in dict.fromkeys(each.sides) if it in sizes)
+        return ValueError(
+            f'{each.name} of the kernel {self.name} has the shape {value.shape}, accepted is '
+            f'{"".join(f"[{side}]" for side in each.sides)}{" with " * bool(known)}{known}'
+        )
+
+
+def _as_declared(value: Any, each: Parameter, kernel: str) -> np.ndarray:
+    """Return an argument as an array in C order of the declared type."""
+    array = np.asarray(value)
+    if not np.can_cast(array.dtype, each.dtype, 'same_kind'):
+        raise TypeError(
+            f'{each.name} of the kernel {kernel} has the type {array.dtype}, accepted is '
+            f'{each.dtype}'
+        )
+    return np.ascontiguousarray(array, each.dtype).reshape(array.shape)
 
 
 def declared(header: str) -> dict[str, Kernel]:

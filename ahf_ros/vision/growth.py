@@ -10,10 +10,10 @@ from __future__ import annotations
 import numpy as np
 
 from ahf_ros.vision.image import GAMMA
-from ahf_ros.vision.normal import exact_normal_integral
+from ahf_ros.vision.normal import normal_integral
 
 _QUANTILES = np.linspace(-3.0, 3.0, 601)  # standard deviations of the blur
-_SHARES = exact_normal_integral(_QUANTILES)  # of the light from ink to paper, there
+_SHARES = normal_integral(_QUANTILES)  # of the light from ink to paper, there
 # Variance of the blur that interpolation between gray values adds, px^2: with it, rings rendered
 # with blurs from 0.4 to 2 px and inks of 0.06 and 0.2 of the light have grown by 0.00 to 0.04 px,
 # and with inks of 0.02, whose edges are no longer like normally blurred ones, by 0.03 to 0.16 px.

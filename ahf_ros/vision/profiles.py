@@ -16,7 +16,7 @@ from math import pi, sqrt
 
 import numpy as np
 
-from ahf_ros.vision.normal import exact_normal_integral
+from ahf_ros.vision.normal import normal_integral
 from ahf_ros.vision.sampling import sample_lines, within
 
 USUAL_BLUR = 0.8
@@ -182,7 +182,7 @@ def _step_filters(group: int) -> _StepFilters:
     offsets = half * np.linspace(-_MAXIMUM_OFFSET, _MAXIMUM_OFFSET, _OFFSETS)
     away = along - offsets[:, None]
     scaled = away / blur
-    rise = exact_normal_integral(scaled)
+    rise = normal_integral(scaled)
     density = np.exp(-0.5 * scaled**2) / (blur * sqrt(2 * pi))
     light = away * (_CONTRAST + (1 - _CONTRAST) * rise)
     design = np.stack([1 - rise, rise, density, light, scaled * density], axis=2)

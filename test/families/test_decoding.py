@@ -20,10 +20,8 @@ def seen(marked: np.ndarray, weight: float = 1.0) -> Evidence:
     there, absent = (np.float32(weight * of / 2) for of in (FOR, AGAINST))  # of either half
     count, halves = len(marked), np.stack([marked, marked], axis=1)
     return Evidence(
-        paper=np.where(halves, absent, there),
-        ink=np.where(halves, there, absent),
-        between=np.zeros((count, 2, 0, marked.shape[1]), np.float32),
-        typical=np.zeros((count, 2, 0, marked.shape[1]), np.float32),
+        looks=np.stack([np.where(halves ^ ink, there, absent) for ink in (True, False)], axis=2),
+        typical=np.zeros((count, 2, 2, marked.shape[1]), np.float32),
         weight=np.full(count, weight, np.float32),
         dot=np.zeros(count, np.float32),
         lit=np.full(count, SURPRISES[0], np.float32),
@@ -39,9 +37,9 @@ def of_word(word: int, phase: int = 0, code: RingPrint = CODE) -> np.ndarray:
 
 def hidden_at(clear: Evidence, covered: slice | np.ndarray) -> Evidence:
     """Return evidence against paper and ink at some angles."""
-    paper, ink = clear.paper.copy(), clear.ink.copy()
-    paper[..., covered] = ink[..., covered] = -2.0
-    return replace(clear, paper=paper, ink=ink)
+    looks = clear.looks.copy()
+    looks[..., covered] = -2.0
+    return replace(clear, looks=looks)
 
 
 def read(evidence: Evidence, overhang: float = 0.0, code: RingPrint = CODE) -> Words:
@@ -134,9 +132,9 @@ def test_the_dot_speaks_for_a_target_and_not_for_a_word() -> None:
 
 def test_one_reading_never_says_more_than_its_share() -> None:
     clear = seen(WORD)
-    paper = clear.paper.copy()
-    paper[0, :, 3] = -1000.0 if paper[0, 0, 3] > 0 else 1000.0
-    found = read(replace(clear, paper=paper))
+    looks = clear.looks.copy()
+    looks[0, :, 0, 3] = -1000.0 if looks[0, 0, 0, 3] > 0 else 1000.0
+    found = read(replace(clear, looks=looks))
     assert canonical(found.words, CODE)[1].tolist() == [30]
     assert read(clear).seen[0] - found.seen[0] < 7
 

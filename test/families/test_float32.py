@@ -10,7 +10,7 @@ from ahf_ros.families.ring import reading
 from ahf_ros.families.ring.likelihood import Evidence, normal
 from support.scenes import identified, rendering
 
-SINGLE = {'paper', 'ink', 'between', 'sharp', 'weight', 'dot', 'lit'}
+SINGLE = {'looks', 'typical', 'weight', 'dot', 'lit'}
 
 
 def test_a_density_has_the_type_of_its_values() -> None:

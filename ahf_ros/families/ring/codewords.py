@@ -6,6 +6,7 @@ from functools import cache, lru_cache
 
 import numpy as np
 
+from ahf_ros import kernels
 from ahf_ros.prints.cyclic import rotated_words
 from ahf_ros.prints.ring import RingPrint
 
@@ -73,27 +74,9 @@ def likeliest_bits(ones: np.ndarray, pairs: np.ndarray) -> tuple[np.ndarray, np.
 
     The evidence is that of `best_words`. By dynamic programming, once for each first bit.
     """
-    count, bands = ones.shape[-1], ones.shape[:-1]
-    ones, pairs = (of.reshape(-1, count).T for of in (ones, pairs))
-    # The first axis is the first bit, the second one the last bit so far.
-    scores = np.full((2, 2, ones.shape[1]), -np.inf)
-    scores[0, 0], scores[1, 1] = 0.0, ones[0]
-    before = np.zeros((count, *scores.shape), bool)
-    for bit in range(1, count):
-        zero, one = scores[:, 0], scores[:, 1]
-        joined = one + pairs[bit]
-        before[bit, :, 0], before[bit, :, 1] = one > zero, joined > zero
-        scores[:, 0], scores[:, 1] = np.maximum(zero, one), np.maximum(zero, joined) + ones[bit]
-    scores[1, 1] += pairs[0]
-    ends = scores.reshape(4, -1)
-    best, highest = ends.argmax(axis=0), ends.max(axis=0)
-    first, last = best >> 1, best & 1
-    bits = np.zeros((len(best), count), bool)
-    flat, rows = before.reshape(count, 4, -1), np.arange(len(best))
-    for bit in range(count - 1, -1, -1):
-        bits[:, bit] = last
-        last = flat[bit, 2 * first + last, rows]
-    return bits.reshape(*bands, count), highest.reshape(bands)
+    of_bands = (of.reshape(-1, of.shape[-1]) for of in (ones, pairs))
+    bits, highest, _ = kernels.likeliest_bits(*of_bands)
+    return bits.reshape(ones.shape), highest.reshape(ones.shape[:-1])
 
 
 def _beside(bits: np.ndarray, ones: np.ndarray, pairs: np.ndarray) -> np.ndarray:

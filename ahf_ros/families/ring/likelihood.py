@@ -19,6 +19,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ahf_ros import kernels
 from ahf_ros.families.ring.polar import CORRELATION, LIGHT_EDGE, PolarImages
 from ahf_ros.vision.array_record import ArrayRecord
 from ahf_ros.vision.circle_fit import SOFT
@@ -67,10 +68,9 @@ class Evidence(ArrayRecord):
 
     Attributes
     ----------
-    paper, ink : ndarray of float32, shape (k, 2, m)
-        Where the band is unmarked, and where it is marked.
-    between : ndarray of float32, shape (k, 2, s, m)
-        Where blur mixes both, for shares of ink in equal steps from paper to ink; s may be 0.
+    looks : ndarray of float32, shape (k, 2, n, m)
+        For shares of ink in equal steps from paper to ink: where the band is unmarked, where blur
+        mixes both, and where it is marked.
     typical : ndarray of float32, shape (k, 2, 2, m)
         What edges of paper and of ink give on average where these look as they should, as far as
         edges of light let them; only where shares of ink are asked for.
@@ -86,15 +86,23 @@ class Evidence(ArrayRecord):
         Of ends of arcs, standard deviation in angles.
     """
 
-    paper: np.ndarray
-    ink: np.ndarray
-    between: np.ndarray
+    looks: np.ndarray
     typical: np.ndarray
     weight: np.ndarray
     dot: np.ndarray
     lit: np.ndarray
     covered: np.ndarray
     blur: np.ndarray
+
+    @property
+    def paper(self) -> np.ndarray:
+        """Evidence for unmarked bands, shape (k, 2, m)."""
+        return self.looks[..., 0, :]
+
+    @property
+    def ink(self) -> np.ndarray:
+        """Evidence for marked bands, shape (k, 2, m)."""
+        return self.looks[..., -1, :]
 
     def plus(self, levels: Evidence) -> Evidence:
         """Return the sum of the evidence of edges and of levels, where nothing covers the ground.
@@ -106,10 +114,8 @@ class Evidence(ArrayRecord):
         anywhere = np.logical_or.reduce(beside, axis=2, keepdims=True)
         across = beside | (levels.covered & anywhere)
         return Evidence(
-            paper=np.where(self.covered, 0, self.paper) + np.where(across, 0, levels.paper),
-            ink=np.where(self.covered, 0, self.ink) + np.where(across, 0, levels.ink),
-            between=np.where(self.covered[:, :, None], 0, self.between)
-            + np.where(across[:, :, None], 0, levels.between),
+            looks=np.where(self.covered[:, :, None], 0, self.looks)
+            + np.where(across[:, :, None], 0, levels.looks),
             typical=self.typical,
             weight=self.weight,
             dot=self.dot + levels.dot,
@@ -157,33 +163,38 @@ def edge_evidence(
     From the radii of the dots as printed and the growth of their colour, (k,), units of the frame.
     """
     inner, outer = band_edges(radius, growth, band)
-    edges = light_edges(polar, radius, growth, inner)
-    ground_at, band_at = _beside_edges(polar, radius + growth, inner, outer)
-    ground, inside = polar.at(ground_at), polar.at(band_at)
-    # Shares of ink on ground and band, without marks and with them.
-    bare = [_rest(polar, at, radius + growth) for at in (ground_at, band_at)]
-    marked = [
-        of_rest + _blurred(polar, at, inner[:, None], outer[:, None])
-        for of_rest, at in zip(bare, (ground_at, band_at), strict=True)
-    ]
-    paper, ink, *between = _step_evidence(polar, inside, ground, edges, bare, marked, shares)
-    between, typical = between[: len(shares)], between[len(shares) :]
+    lit = light_edges(polar, radius, growth, inner)
+    places = _beside_edges(polar, radius + growth, inner, outer)
+    ground_at, band_at = places
+    ground, inside = map(polar.at, places)
+    of_shares = polar.plate, radius + growth, inner, outer, polar.blur / polar.size
+    (bare, marked), (bare_inside, marked_inside) = (
+        kernels.ink_shares(at, *of_shares) for at in places
+    )
     weight = weights(polar)
     visible = polar.reach[:, None] >= np.maximum(ground_at, band_at)
     visible[:, 1] &= polar.plate > outer[:, None]
-    share = weight[:, None, None] * visible
+    dark = polar.polarity > 0
+    looks, typical = kernels.step_evidence(
+        *(ground, inside, bare, marked, bare_inside, marked_inside),
+        *(weight[:, None, None] * visible, np.array([0, *shares, 1], np.float32)),
+        *(polar.contrast, dark, polar.noise, polar.glare, lit),
+        *(LOG_OFFSET, SATURATED, _FLAT, _WHITE, _MARK, _MARK_TAIL, _SHARE),
+        *(_ANY, _PLAIN, _AT_ENDS),
+    )
     covered = np.zeros(visible.shape, bool)
     if shares:
-        lit_ground = np.maximum(ground, polar.paper(ground, marked[0]))
-        covered = _covered(polar, inside, lit_ground, ink > paper, visible)
+        covered = kernels.covered_ground(
+            *(ground, inside, np.maximum(ground, polar.paper(ground, marked))),
+            *(looks[:, :, -1] > looks[:, :, 0], visible, polar.shade, polar.contrast, dark),
+            *(LOG_OFFSET, SATURATED, LIGHT_EDGE, _MARKED),
+        )
     return Evidence(
-        paper=paper * share,
-        ink=ink * share,
-        between=_stacked(between, ink) * share[:, :, None],
-        typical=_stacked(typical, ink) * share[:, :, None],
+        looks=looks,
+        typical=typical,
         weight=weight,
         dot=np.zeros_like(weight),
-        lit=edges.astype(np.float32),
+        lit=lit.astype(np.float32),
         covered=covered,
         blur=_blur_along(polar, band),
     )
@@ -211,17 +222,6 @@ def _beside_edges(
     return ground, band
 
 
-def _rest(polar: PolarImages, at: np.ndarray, dot: np.ndarray) -> np.ndarray:
-    """Return the shares of ink at radii (k, r, m) that is not of the band, (k, r, m).
-
-    It is ink of dots with edges at radii (k,); white paper beyond plates is as white ink.
-    """
-    of_dot = _blurred(polar, at, -np.inf, dot[:, None])
-    if np.isinf(polar.plate).all():
-        return of_dot
-    return np.asarray(of_dot + _blurred(polar, at, polar.plate, np.inf))
-
-
 def _blurred(
     polar: PolarImages,
     at: np.ndarray,
@@ -244,38 +244,6 @@ def _blur_along(polar: PolarImages, band: tuple[float, float]) -> np.ndarray:
     return np.asarray(polar.blur / (np.pi * sum(band) * polar.size / polar.gray.shape[1]))
 
 
-def _stacked(between: Sequence[np.ndarray], like: np.ndarray) -> np.ndarray:
-    """Return arrays (k, 2, m) as one, (k, 2, n, m), of which there may be none."""
-    none = np.zeros((*like.shape[:2], 0, like.shape[2]), np.float32)
-    return np.stack(between, axis=2) if between else none
-
-
-def _covered(
-    polar: PolarImages,
-    band: np.ndarray,
-    ground: np.ndarray,
-    marked: np.ndarray,
-    visible: np.ndarray,
-) -> np.ndarray:
-    """Return where something covers the ground, which is no shadow, all of shape (k, 2, m).
-
-    Marks in shadow are darker than those in the light, and nothing that covers a target is.
-    """
-    shade = polar.shade[:, None, None]
-    covered = (ground <= shade) & visible
-    if not covered.any():
-        return covered
-    in_shadow = covered & marked & (band < polar.inked(shade, band))
-    shadow = in_shadow.sum(axis=(1, 2)) > _MARKED * covered.sum(axis=(1, 2))
-    covered &= ~shadow[:, None, None]
-    # The border of what is as dark as ink looks like the edge of a mark.
-    as_ink = polar.levels(polar.inked(shade, ground))
-    like_ink = [np.abs(polar.levels(of) - as_ink) < LIGHT_EDGE for of in (ground, band)]
-    across = np.logical_and.reduce(like_ink[1], axis=1, keepdims=True)
-    hidden = np.asarray(covered & like_ink[0])[:, ::-1] & across
-    return np.asarray(covered | hidden)
-
-
 def light_edges(
     polar: PolarImages, radius: np.ndarray, growth: np.ndarray, inner: np.ndarray
 ) -> np.ndarray:
@@ -286,72 +254,6 @@ def light_edges(
     step = np.abs(level[:, 0] - level[:, 1])
     many = (step**2 > LIGHT_EDGE**2 + 4 * (noise**2).sum(axis=1)).mean(axis=1)
     return np.clip(many, *SURPRISES)
-
-
-def _step_evidence(
-    polar: PolarImages,
-    band: np.ndarray,
-    ground: np.ndarray,
-    edges: np.ndarray,
-    bare: Sequence[np.ndarray],
-    marked: Sequence[np.ndarray],
-    shares: Sequence[float],
-) -> list[np.ndarray]:
-    """Return the evidence of steps from ground into bands, (k, 2, m), for paper and for ink.
-
-    The shares of ink that blur leaves on ground and band, shape (k, 2, 1) each, are those of bare
-    bands and of marked ones. Glare makes the step of a mark smaller. Where it makes ground white,
-    paper between is white. Then comes that for shares of marks, and what paper and ink give on
-    average: where they look as they should, and where an edge of light lies between.
-    """
-    (level, noise), (beside, of_ground) = polar.logs(band), polar.logs(ground)
-    blank, ink = (
-        polar.printed(polar.paper(ground, on_ground), on_band, band)
-        for on_ground, on_band in (bare, marked)
-    )
-    mark = polar.levels(ink) - beside
-    step = level - beside
-    limit = polar.glare[:, None, None]
-    glare, white = ground >= limit, np.minimum(*ground.swapaxes(0, 1))[:, None] >= SATURATED
-    flat = np.where(white & (limit <= SATURATED), np.float32(_WHITE), np.float32(_FLAT))
-    spread = np.sqrt(flat**2 + noise**2 + of_ground**2)
-    flat = normal(level - polar.levels(blank), spread)
-    more = (step - mark) * np.sign(mark)
-    expected = of_ground * _gain(ground, ink)
-    of_noise, of_ink = noise**2, expected**2
-    low, high = (np.sqrt(of**2 + of_noise + of_ink) for of in (_MARK, _MARK_TAIL))
-    width = np.where(more > 0, high, low)
-    inked = normal(more, width) * (2 * width / (low + high))
-    if glare.any():
-        less = glare & (more < 0) & (more > -np.abs(mark))
-        inked = np.where(less, np.maximum(inked, 1 / np.maximum(np.abs(mark), _FLAT)), inked)
-    lit = edges.astype(np.float32)[:, None, None]
-    densities = [flat, inked]
-    width = np.sqrt(_MARK**2 + (_SHARE * mark) ** 2 + of_noise + of_ink) if shares else low
-    for share in shares:
-        on_ground, on_band = (
-            of_bare + np.float32(share) * (of_mark - of_bare)
-            for of_bare, of_mark in zip(bare, marked, strict=True)
-        )
-        mixed = polar.printed(polar.paper(ground, on_ground), on_band, band)
-        densities.append(normal(level - polar.levels(mixed), width))
-    anything = [_PLAIN * flat + (1 - _PLAIN) * _ANY] * len(densities)
-    if shares:
-        zero = np.zeros_like(spread)
-        densities += [normal(zero, spread), normal(zero, (low + high) / 2)]
-        plain = normal(zero, spread), normal(mark, spread)
-        anything += [_PLAIN * of + (1 - _PLAIN) * _ANY for of in plain]
-    doubts = [lit] * len(densities)
-    doubts[2 : 2 + len(shares)] = [np.maximum(lit, np.float32(_AT_ENDS))] * len(shares)
-    odds = [
-        np.log(((1 - doubt) * density + doubt * _ANY) / of)
-        for doubt, density, of in zip(doubts, densities, anything, strict=True)
-    ]
-    if shares:
-        at_edge = lit * np.log(lit / (1 - _PLAIN))
-        odds[-2:] = [(1 - lit) * of + at_edge for of in odds[-2:]]
-    clear = polar.tells(band)
-    return [np.where(clear, of, 0) for of in odds]
 
 
 def _gain(paper: np.ndarray, ink: np.ndarray) -> np.ndarray:
@@ -419,15 +321,13 @@ def level_evidence(
             np.stack(
                 [of[..., half & in_band].sum(axis=2) + below for half, below in beside], axis=1
             )
-            for of in (paper, ink, *between)
+            for of in (paper, *between, ink)
         ]
     )
     of_halves *= _predicted(of_halves.max(axis=0), weight[:, None])
     return Evidence(
-        paper=of_halves[0],
-        ink=of_halves[1],
-        between=np.moveaxis(of_halves[2:], 0, 2),
-        typical=_stacked([], of_halves[1]),
+        looks=np.moveaxis(of_halves, 0, 2),
+        typical=np.zeros((len(level), 2, 2, level.shape[1]), np.float32),
         weight=weight,
         dot=(ink - paper)[..., in_dot].sum(axis=(1, 2)),
         lit=surprise[:, 0, 0].astype(np.float32),

@@ -7,6 +7,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from ahf_ros import kernels
 from ahf_ros.vision import frame
 from ahf_ros.vision.array_record import ArrayRecord
 from ahf_ros.vision.black import black_lift, lifted
@@ -136,22 +137,8 @@ class PolarImages(ArrayRecord):
 
         The radii are in dot radii.
         """
-        spacing = (self.outermost - _INNERMOST) / (self.gray.shape[2] - 1)
-        place = (radii - _INNERMOST) / _along(spacing, radii)
-        place = np.clip(place, 0, self.gray.shape[2] - 1.001)
-        below = place.astype(np.intp)
-        share = (place - below).astype(np.float32)
-        row, angles = self.row[:, None], np.arange(radii.shape[2])
-        values, beyond = (
-            self.gray[row, :, circle[..., 0]]  # in one piece
-            if len(angles) == 1
-            else self.gray[row[..., None], angles, circle]
-            for circle in (below, below + 1)
-        )
-        values *= 1 - share
-        beyond *= share
-        values += beyond
-        return values
+        gray = self.gray.swapaxes(1, 2)
+        return kernels.gray_at(gray, self.row, _INNERMOST, self.outermost, radii)
 
     def inked(self, paper: np.ndarray, seen: np.ndarray) -> np.ndarray:
         """Return the gray values of ink of the dot's colour where paper has some, (k, ...).

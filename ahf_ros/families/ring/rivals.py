@@ -82,8 +82,7 @@ def word_ceilings(
     polar = polar_images(gray, dots, band, _ANGLES)
     growth = best_growth(polar, band, prior)
     edges = without_outliers(edge_evidence(polar, 1 - growth, growth, band, SHARES))
-    mixed = edges.between.max(axis=1, initial=-np.inf)
-    either = np.maximum(np.maximum(edges.paper, edges.ink), mixed)
+    either = edges.looks.max(axis=1)
     sums = np.cumsum(np.tile([edges.paper, edges.ink, either], 3), axis=2, dtype=np.float64)
 
     def between(starts: np.ndarray, ends: np.ndarray) -> np.ndarray:

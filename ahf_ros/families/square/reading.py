@@ -29,7 +29,7 @@ from ahf_ros.prints.square import borders, corner_counts, words
 from ahf_ros.vision.array_record import ArrayRecord
 from ahf_ros.vision.frame import project
 from ahf_ros.vision.logarithm import LOG_OFFSET
-from ahf_ros.vision.normal import exact_normal_integral
+from ahf_ros.vision.normal import normal_integral
 from ahf_ros.vision.sampling import sample
 
 _IN_CELL = ((0.0, 0.0), (-0.2, -0.2), (-0.2, 0.2), (0.2, -0.2), (0.2, 0.2))
@@ -331,7 +331,7 @@ def _unmixed(values: np.ndarray, corners: np.ndarray, side: int, blurs: np.ndarr
     count = values.shape[1]
     neighbours = np.eye(count, k=1) + np.eye(count, k=-1)
     neighbours[0, 0] = neighbours[-1, -1] = 1
-    across, down = (exact_normal_integral(-of / blurs / 2) for of in _cell_sizes(corners, side).T)
+    across, down = (normal_integral(-of / blurs / 2) for of in _cell_sizes(corners, side).T)
     mixed = [
         np.eye(count)
         + np.minimum(of, _MOST_MIXED)[:, None, None] * (neighbours - 2 * np.eye(count))

@@ -1,0 +1,97 @@
+"""Kernels are called as the header declares them, and nothing else gets through."""
+
+import ctypes
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ahf_ros import kernels
+from support import ROOT
+
+FOLDER = kernels.HEADER.parent
+HEADER = """
+/* void none(count n, double y[n]); */
+void sums(count n, count m, const double rows[n][m], const float *unused);
+"""
+
+
+def test_every_function_of_the_header_is_in_a_file_and_in_the_library() -> None:
+    declared = kernels.declared(kernels.HEADER.read_text())
+    sources = ''.join(it.read_text() for it in FOLDER.glob('*.c'))
+    defined = re.findall(r'^void (\w+)\(', sources, re.M)
+    assert sorted(declared) == sorted(defined)
+    library = ctypes.CDLL(str(kernels.LIBRARY))
+    assert all(hasattr(library, name) for name in declared)
+
+
+def test_comments_declare_nothing_and_pointers_are_refused() -> None:
+    with pytest.raises(ValueError, match=r'const float \*unused.*accepted is'):
+        kernels.declared(HEADER)
+
+
+@pytest.mark.parametrize(
+    ('values', 'counts', 'error', 'message'),
+    [
+        ((), {}, TypeError, 'has 0 arguments, accepted are x'),
+        (([0.0], 1), {}, TypeError, 'has 2 arguments'),
+        ((['a'],), {}, TypeError, r'x of the kernel exponentials has the type <U1, accepted is f'),
+        (([1j],), {}, TypeError, 'has the type complex128'),
+        (([[0.0]],), {}, ValueError, r'has the shape \(1, 1\), accepted is \[n\]'),
+        (([0.0],), {'n': 2}, ValueError, r'has the shape \(1,\), accepted is \[n\] with n = 2'),
+    ],
+)
+def test_what_does_not_fit_the_declaration_is_refused(
+    values: tuple[object, ...], counts: dict[str, int], error: type[Exception], message: str
+) -> None:
+    with pytest.raises(error, match=message):
+        kernels.exponentials(*values, **counts)
+
+
+@pytest.mark.parametrize('kind', [np.float32, np.int16, np.uint8, bool])
+def test_other_types_and_orders_are_cast(kind: type) -> None:
+    values = np.arange(12).reshape(3, 4).astype(kind)
+    expected = np.exp(values[::2, 1].astype(float))
+    assert kernels.exponentials(values[::2, 1]) == pytest.approx(expected)
+    backwards = values[0, ::-1]
+    assert kernels.exponentials(backwards) == pytest.approx(np.exp(backwards.astype(float)))
+
+
+def test_arguments_that_may_not_be_written_are_read() -> None:
+    values = np.zeros(3)
+    values.flags.writeable = False
+    assert kernels.exponentials(values).tolist() == [1, 1, 1]
+
+
+def test_nothing_is_called_for_empty_arrays() -> None:
+    bits, highest, _ = kernels.likeliest_bits(np.zeros((0, 5)), np.zeros((0, 5)))
+    assert bits.shape == (0, 5)
+    assert highest.shape == (0,)
+    bits, highest, _ = kernels.likeliest_bits(np.zeros((2, 0)), np.zeros((2, 0)))
+    assert highest.tolist() == [0, 0]
+
+
+def imported(library: Path) -> subprocess.CompletedProcess[str]:
+    code = 'from ahf_ros import kernels; kernels.exponentials([0.0])'
+    environment = {**os.environ, kernels.VARIABLE: str(library)}
+    return subprocess.run(
+        [sys.executable, '-c', code], capture_output=True, text=True, env=environment, cwd=ROOT
+    )
+
+
+def test_a_library_that_is_missing_or_of_another_machine_is_named(tmp_path: Path) -> None:
+    missing = imported(tmp_path / 'none.so').stderr.splitlines()[-1]
+    assert 'none.so does not exist: the kernels of ahf_ros are not compiled; pip' in missing
+    other = tmp_path / 'other.so'
+    other.write_bytes(bytes(20) + kernels.LIBRARY.read_bytes()[20:])
+    assert 'was compiled for another machine or is damaged' in imported(other).stderr
+
+
+def test_kernels_are_attributes_and_nothing_else_is() -> None:
+    assert 'likeliest_bits' in dir(kernels)
+    with pytest.raises(AttributeError, match="has no attribute 'likeliest_bit'"):
+        kernels.likeliest_bit  # noqa: B018
