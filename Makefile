@@ -4,6 +4,7 @@
 # make test    every check: ruff, mypy, the import rules, the site, the tests; then the tests that
 #              need no ROS with the oldest versions and without the processor's vector units
 # make test-colcon  the tests as colcon runs them, for once a week: half an hour
+# make wheels  a wheel for each system and processor that kernels are compiled for, in dist/
 # make site    the documentation as a site, build/site/index.html
 # All set up .venv first, with what they need; nothing is installed outside it.
 # DISTRIBUTION=kilted takes the wheels of ROS 2 Kilted instead of Jazzy, into .venv-kilted.
@@ -34,8 +35,8 @@ OLDEST := .venv-oldest
 unexport AMENT_PREFIX_PATH CMAKE_PREFIX_PATH LD_LIBRARY_PATH PYTHONPATH
 unexport _ROS_WHEELS_BOOTSTRAP_COMPLETE
 
-.PHONY: demo nodes test lint site test-native test-live test-commands test-computing test-detectors \
-	coverage test-oldest test-portable test-kilted test-colcon yardstick browser clean
+.PHONY: demo nodes wheels test lint site test-native test-live test-commands test-computing test-detectors \
+	coverage test-oldest test-portable test-sanitized test-kilted test-colcon yardstick browser clean
 .DELETE_ON_ERROR:
 
 demo: $(INSTALLED)
@@ -44,7 +45,7 @@ demo: $(INSTALLED)
 nodes: $(NODES)
 
 # The longest first, and none so long that it ends alone: two cores end at the same time.
-test: test-live test-oldest yardstick test-detectors coverage site lint test-portable
+test: test-live test-oldest yardstick test-detectors coverage site lint test-portable test-sanitized
 
 lint: $(READY)
 	$(BIN)/ruff check .
@@ -102,6 +103,7 @@ SHARED = --ignore test/benchmarks --ignore test/bag --ignore test/batch --ignore
 # those that both were compiled for: other last bits than those of the tests above. What lasts long
 # is tested with the newest versions only.
 test-oldest: $(OLDEST)/ready
+	$(OLDEST)/bin/python scripts/build_kernels.py
 	$(OLDEST)/bin/python -m support.vector_units baseline $(OLDEST)/bin/python -m pytest \
 		-m 'not lasting' $(SHARED)
 
@@ -109,6 +111,17 @@ test-oldest: $(OLDEST)/ready
 test-portable: $(READY)
 	$(BIN)/python -m support.vector_units baseline $(BIN)/python -m pytest \
 		-m 'not lasting' test/families/test_square.py test/families/test_edges.py
+
+# The kernels with checks of every access to memory, and of arithmetic that C leaves undefined.
+SANITIZED := build/sanitized.bin
+
+test-sanitized: $(READY)
+	mkdir -p build
+	$(BIN)/python scripts/build_kernels.py $(SANITIZED) -g -O1 -fsanitize=address,undefined \
+		-fno-sanitize-recover=all
+	AHF_ROS_KERNELS=$(abspath $(SANITIZED)) ASAN_OPTIONS=detect_leaks=0 \
+		LD_PRELOAD="$$($${CC:-cc} -print-file-name=libasan.so)" \
+		$(BIN)/python -m pytest test/kernels
 
 # What talks to ROS 2, on Kilted, with no more installed than that needs; what lasts long does so on
 # Jazzy only.
@@ -118,6 +131,17 @@ test-kilted:
 	.venv-kilted/bin/python -m pytest -m 'not lasting' \
 		$$(grep -lrE 'rclpy|graph: ' test/bag test/clouds test/files test/nodes \
 			--include='test_*.py')
+
+# The compiler, from PyPI, compiles for all of them.
+WHEELS := .venv-wheels
+
+wheels:
+	$(PYTHON) -m venv $(WHEELS)
+	$(WHEELS)/bin/python -m pip install $(QUIET) 'setuptools>=77' ziglang
+	for platform in $$($(WHEELS)/bin/python scripts/build_kernels.py --platforms); do \
+		$(WHEELS)/bin/python -m pip wheel $(QUIET) --no-deps --no-build-isolation --wheel-dir dist \
+			--config-settings=--build-option=--plat-name=$$platform . || exit; \
+	done
 
 # With ROS 2 from PyPI; where one is sourced, run the script itself.
 test-colcon:

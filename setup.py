@@ -14,7 +14,7 @@ from setuptools.command.build_ext import build_ext
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE / 'scripts'))
 
-from build_kernels import TARGETS, build, in_place, suffix  # noqa: E402
+from build_kernels import LIBRARY, TARGETS, build  # noqa: E402
 
 
 class BuildKernels(build_ext):
@@ -22,7 +22,7 @@ class BuildKernels(build_ext):
 
     def get_ext_filename(self, fullname: str) -> str:
         """Return the path of the library in the package."""
-        return fullname.replace('.', os.sep) + suffix(self.plat_name)
+        return fullname.replace('.', os.sep) + LIBRARY.suffix
 
     def build_extension(self, ext: Extension) -> None:
         """Compile the library."""
@@ -33,11 +33,17 @@ class BuildKernels(build_ext):
 
     def copy_extensions_to_source(self) -> None:
         """Compile it where the sources are, for an editable installation."""
-        build(in_place())
+        build(LIBRARY)
 
 
 class KernelWheel(bdist_wheel):
     """A wheel for any Python on one platform."""
+
+    def finalize_options(self) -> None:
+        """Compile for the platform of the wheel."""
+        super().finalize_options()
+        if self.plat_name_supplied:
+            self.distribution.get_command_obj('build_ext').plat_name = self.plat_name
 
     def get_tag(self) -> tuple[str, str, str]:
         """Return the tag of the wheel."""
@@ -55,7 +61,7 @@ setup(
         'ahf_ros.network.report': ['html/*'],
         'ahf_ros.views.report': ['page/*'],
     },
-    ext_modules=[Extension('ahf_ros.kernels.libkernels', [])],
+    ext_modules=[Extension('ahf_ros.kernels.kernels', [])],
     cmdclass={'build_ext': BuildKernels, 'bdist_wheel': KernelWheel},
     # With this an editable installation is one path to the sources, new modules included.
     package_dir={'': '.'},

@@ -1,5 +1,7 @@
 """Compile the kernels: `python scripts/build_kernels.py [LIBRARY] [FLAG ...]`.
 
+`--platforms` in their place lists the platforms of wheels.
+
 setup.py uses it, too. The compiler is that of the machine, or ziglang from PyPI where there is
 none, or where the library is for another machine.
 """
@@ -12,12 +14,12 @@ import shlex
 import shutil
 import subprocess
 import sys
-import sysconfig
 import tempfile
 from pathlib import Path
 
 FOLDER = Path(__file__).resolve().parents[1] / 'ahf_ros' / 'kernels'
 FLAGS = FOLDER / 'compile_flags.txt'
+LIBRARY = FOLDER / 'kernels.bin'  # no suffix of Python's: it is no module
 ZIG = 'ziglang'
 
 TARGETS = {
@@ -31,16 +33,6 @@ TARGETS = {
     'win_arm64': 'aarch64-windows-gnu',
 }
 """What zig calls the platforms of wheels."""
-
-
-def suffix(platform: str) -> str:
-    """Return the suffix of libraries on a platform, as sysconfig and wheels name it."""
-    return {'win': '.dll', 'mac': '.dylib'}.get(platform[:3], '.so')
-
-
-def in_place() -> Path:
-    """Return the library beside its sources, where an editable installation has it."""
-    return FOLDER / ('libkernels' + suffix(sysconfig.get_platform()))
 
 
 def own_compiler() -> list[str] | None:
@@ -75,4 +67,7 @@ def build(library: Path, *flags: str, platform: str | None = None) -> None:
 
 
 if __name__ == '__main__':
-    build(Path(sys.argv[1]).resolve() if len(sys.argv) > 1 else in_place(), *sys.argv[2:])
+    if sys.argv[1:] == ['--platforms']:
+        print(*TARGETS)
+        sys.exit()
+    build(Path(sys.argv[1]).resolve() if len(sys.argv) > 1 else LIBRARY, *sys.argv[2:])

@@ -39,7 +39,9 @@ PLATFORMS = {
 
 HEAD = """# Where pip finds wheels
 
-The package is pure Python. `pip install .` compiles nothing where its dependencies have wheels.
+`pip install .` compiles the kernels of this package, and nothing else where its dependencies have
+wheels. `make wheels` compiles them for all of these systems, on any of them.
+
 For these machines pip was asked for them ({date}); a cell has the versions of numpy and OpenCV
 that it chose, or what has no wheel there. Printed by `python scripts/write_wheels.py`.
 

@@ -36,6 +36,7 @@ OPENERS = {'open', 'read_text', 'read_bytes', 'imread', 'loadtxt', 'genfromtxt',
 
 MAY_OPEN = {
     **dict.fromkeys(('base/opening.py', 'base/writing.py'), 'ways in and out'),
+    'kernels/__init__.py': 'the header of the package',
     'files/whole.py': 'standard error',
     'files/arrays.py': 'members of an archive in memory',
     'files/exif.py': 'a file that is open already',

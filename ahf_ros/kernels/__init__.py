@@ -19,7 +19,6 @@ from __future__ import annotations
 import ctypes
 import os
 import re
-import sys
 from dataclasses import dataclass
 from functools import cache, cached_property
 from pathlib import Path
@@ -28,8 +27,7 @@ from typing import Any
 import numpy as np
 
 HEADER = Path(__file__).with_name('kernels.h')
-SUFFIX = {'darwin': '.dylib', 'win32': '.dll'}.get(sys.platform, '.so')
-LIBRARY = HEADER.with_name('libkernels' + SUFFIX)
+LIBRARY = HEADER.with_name('kernels.bin')
 VARIABLE = 'AHF_ROS_KERNELS'
 """Names another library, such as one with sanitizers."""
 
