@@ -275,3 +275,28 @@ void best_moves(count k, count n, count m, count v, const float looks[k][n][m],
         }
     }
 }
+
+/* Where light is as predicted, from the best evidence of levels at each angle: light that nothing
+   predicts comes in stretches, each of which has its price and another one for each angle. Paths
+   go round twice. `bounded` is how much better than predicted light the best path before an angle
+   is, at most its price and at least as much less. */
+void predicted_angles(count k, count m, const float best[k][m], const float further[k], float price,
+                      bool predicted[k][m], float bounded[k][m])
+{
+    for (count b = 0; b < k; b++) {
+        float path = 0;
+        for (count i = 1; i < 2 * m; i++) { /* ahead of angles */
+            count a = i < m ? i : i - m;
+            bounded[b][a] = lesser_f(greater_f(path, -price), 0);
+            path = bounded[b][a] - best[b][a] - further[b];
+        }
+        path = -best[b][m - 1] - further[b];
+        for (count i = 2 * m - 2; i >= 0; i--) { /* behind them */
+            count a = i < m ? i : i - m;
+            float behind = lesser_f(greater_f(path, 0), price);
+            float gain = -best[b][a] - further[b];
+            predicted[b][a] = bounded[b][a] + gain + behind <= 0;
+            path = behind + gain;
+        }
+    }
+}

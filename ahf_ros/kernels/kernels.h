@@ -75,5 +75,7 @@ void free_arcs(count k, count n, count m, const float looks[k][n][m], const int6
 void best_moves(count k, count n, count m, count v, const float looks[k][n][m],
                 const uint8_t steps[k][m], const int64_t here[v][m], const int64_t before[v][m],
                 int64_t best[k]);
+void predicted_angles(count k, count m, const float best[k][m], const float further[k], float price,
+                      bool predicted[k][m], float bounded[k][m]);
 
 #endif

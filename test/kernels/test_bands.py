@@ -157,6 +157,25 @@ def test_readings_are_bounded_and_shares_take_the_best_near_them(seed: int) -> N
         assert best[b, s, a] == near.max()
 
 
+@pytest.mark.parametrize('seed', SEEDS)
+def test_light_is_as_predicted_where_the_best_path_says_so(seed: int) -> None:
+    _, drawn = numbers(seed)
+    k, m, price = 3, 1 + seed, 2.0
+    best, further = drawn(k, m), np.abs(drawn(k))
+    predicted, _ = kernels.predicted_angles(best, further, price)
+    for b in range(k):
+        gain = -best[b].astype(float) - further[b]
+        ahead, behind, path = np.zeros(m), np.zeros(m), 0.0
+        for a in [*range(1, m), *range(m)]:
+            ahead[a] = min(max(path, -price), 0)
+            path = ahead[a] + gain[a]
+        path = gain[-1]
+        for a in [*range(m - 2, -1, -1), *range(m - 1, -1, -1)]:
+            behind[a] = min(max(path, 0), price)
+            path = behind[a] + gain[a]
+        assert predicted[b].tolist() == (ahead + gain + behind <= 0).tolist()
+
+
 def test_a_band_is_moved_to_where_it_fits_best() -> None:
     generator, drawn = numbers(5)
     k, n, m, v = 3, 4, 7, 5

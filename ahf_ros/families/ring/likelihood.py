@@ -324,7 +324,7 @@ def level_evidence(
             for of in (paper, *between, ink)
         ]
     )
-    of_halves *= _predicted(of_halves.max(axis=0), weight[:, None])
+    of_halves *= _predicted(of_halves.max(axis=0), weight)
     return Evidence(
         looks=np.moveaxis(of_halves, 0, 2),
         typical=np.zeros((len(level), 2, 2, level.shape[1]), np.float32),
@@ -339,23 +339,14 @@ def level_evidence(
 def _predicted(best: np.ndarray, weight: np.ndarray) -> np.ndarray:
     """Return where light is as predicted, bool, from the best evidence of levels, (k, 2, m) both.
 
+    `weight`, shape (k,), is that of a reading.
+
     Light that nothing predicts comes in stretches, each of which has its price. Where the best
     path through it (Viterbi 1967) leads, levels say nothing of any word.
     """
-    price = np.float32(-np.log(SURPRISES[0]))
-    gain = np.moveaxis(-best, 2, 0) - _FURTHER * weight
-    # Ahead of an angle and, the other way round, behind it.
-    gains = np.stack([gain, gain[::-1]], axis=1)
-    low, high = (np.array(of, gain.dtype)[:, None, None] for of in ((-price, 0), (0, price)))
-    bounded = np.zeros_like(gains)
-    steps = list(zip(bounded, gains, strict=True))
-    path = np.stack([np.zeros_like(gain[0]), gain[-1]])
-    for of_step, of_gain in steps[1:] + steps:
-        np.maximum(path, low, out=of_step)
-        np.minimum(of_step, high, out=of_step)
-        np.add(of_step, of_gain, out=path)
-    ahead, behind = bounded[:, 0] + gain, bounded[::-1, 1]
-    return np.moveaxis(ahead + behind <= 0, 0, 2)
+    further = np.repeat(np.float32(_FURTHER) * weight, best.shape[1])
+    of_paths = best.reshape(-1, best.shape[2]), further, -math.log(SURPRISES[0])
+    return kernels.predicted_angles(*of_paths)[0].reshape(best.shape)
 
 
 def _as_ink(
