@@ -137,6 +137,28 @@ static inline float normal_density_f(float distance, float deviation)
     return exponential_f(-0.5f * share * share) * (0.39894228f / deviation);
 }
 
+/* Cosine and sine of an angle, to 3e-16, from -1e5 to 1e5; beyond these, or for NaN, of a bound.
+
+   x = n pi / 2 + r with |r| <= pi / 4, whose series are summed up to r^16. */
+static inline void cosine_and_sine(double x, double *cosine, double *sine)
+{
+    static const double round = 6755399441055744.0; /* as for exponential */
+    x = greater(lesser(1e5, x), -1e5);
+    double shifted = x * 0.63661977236758134308 + round;
+    double n = shifted - round;
+    double r = (x - n * 1.57079632673412561417) - n * 6.07710050650619224932e-11, z = r * r;
+    double even = 1.0, odd = 1.0;
+    for (int k = 16; k > 0; k -= 2) {
+        even = 1.0 - z / (k * (k - 1)) * even;
+        odd = 1.0 - z / (k * (k + 1)) * odd;
+    }
+    odd *= r;
+    uint64_t quarter = bits_of(shifted);
+    double across = quarter & 1 ? odd : even, along = quarter & 1 ? even : odd;
+    *cosine = (quarter + 1) & 2 ? -across : across;
+    *sine = quarter & 2 ? -along : along;
+}
+
 static inline double hyperbolic_tangent(double x)
 {
     double grown = exponential(2.0 * greater(lesser(x, 20.0), -20.0));

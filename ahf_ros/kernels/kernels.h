@@ -78,4 +78,32 @@ void best_moves(count k, count n, count m, count v, const float looks[k][n][m],
 void predicted_angles(count k, count m, const float best[k][m], const float further[k], float price,
                       bool predicted[k][m], float bounded[k][m]);
 
+/* cctag_pixels.c */
+
+/* Gray values of the known pixels about a CCTag where paper in full light is 1, and derivatives by
+   all parameters. */
+void cctag_pixels(count h, count w, count n, count c, count q, const bool known[h][w],
+                  const double circles[c], const double light[3][3], double light_size,
+                  double gamma, double sharpening, double mask, const double frame[3][3],
+                  const double values[q], double shown[n], float derivatives[n][27],
+                  float rows[32][2][w], float lines[20][w], float of_h[2][h], float of_w[2][w],
+                  float mixed[h][20][w], float scratch[h][20][w]);
+
+/* The same fitted to gray values that are seen. */
+void cctag_fit(count h, count w, count n, count c, count q, count rounds,
+               const float seen[n], const bool known[h][w], const double circles[c], const double light[3][3],
+               double light_size, double gamma, double sharpening, double mask,
+               const double start[3][3], const double values[q], const double low[q],
+               const double high[q], double most_of_frame, double most_change, double between,
+               const double usual[5], const double deviations[5], const double near[5],
+               const double perspective[2][2], double hardly, const double noise[2],
+               const double outliers[rounds], double normal_spread, double least_spread,
+               double least_free, int16_t trials, double first_damping, double least_damping,
+               double staying, double by_place, double changing, double changing_light,
+               double different, double most_squared, double most_cost, double frame[3][3],
+               double fitted[q], double shown[n], double covariance[27][27], double cost[1],
+               double plain[3][n], double weights[n], double sizes[n], float derivatives[n][27],
+               float rows[32][2][w], float lines[20][w], float of_h[2][h], float of_w[2][w],
+               float mixed[h][20][w], float scratch[h][20][w]);
+
 #endif

@@ -12,24 +12,24 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from ahf_ros import kernels
 from ahf_ros.families.cctag.alignment import usual_perspective
 from ahf_ros.families.cctag.patch import (
-    BLUR,
     EDGES,
     OF_EDGE,
+    OF_INTERPOLATION,
     OF_LIGHT,
-    PERSPECTIVE,
     PRINT,
-    SHIFT,
     Formed,
     Patch,
 )
 from ahf_ros.families.cctag.prior import Prior
 from ahf_ros.vision import frame
-from ahf_ros.vision.robust import NORMAL, geman_mcclure, medians
+from ahf_ros.vision.robust import NORMAL
 
 _ENOUGH = 4  # targets, and edges of light, that tell what is usual
 _SHOWN = 0.3  # ln of the height of an edge of light that tells
+_MOST_OF_FRAME, _MOST = 0.08, 0.3  # changes at once
 _NEAR = 0.3, 0.3, 0.4, 1.0, 0.3  # deviations of an edge of light from where it was
 _PRIOR = Prior()
 _VALUES = _PRIOR.shift, math.log(_PRIOR.blur), 0.0, 0.0, 0.0  # of `Usual`, as the next
@@ -59,6 +59,8 @@ class Fit:
     formed: Formed
     shown: np.ndarray  # gray values that are formed, of pixels that are known, (n,)
     covariance: np.ndarray  # of the parameters, (p, p)
+    cost: float
+    """What is taken from ln of the odds: half the squares of all errors; prints may differ."""
 
     @property
     def errors(self) -> np.ndarray:
@@ -83,14 +85,6 @@ class Fit:
         """Return the mean of squares of errors in their deviations, of which none counts much."""
         squares = self.errors**2 / usual.variances(self.shown)
         return float(np.minimum(squares, _MOST_SQUARED).mean())
-
-    def cost(self, usual: Usual) -> float:
-        """Return what is taken from ln of the odds: half the squares of all errors.
-
-        Those of the print count less, as prints may differ.
-        """
-        away = (usual.values[:3] - self.formed.of_print) / (_DIFFERENT * usual.deviations[:3])
-        return (len(self.shown) * self.misfit(usual) + float(away @ away)) / 2
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,85 +134,23 @@ class Usual:
         """Return the variances of gray values."""
         return self.noise[0] + self.noise[1] * np.maximum(shown, 0)
 
-    def prior(
-        self, patch: Patch, formed: Formed, perspective: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Return the normal matrix (p, p) and the right side (p,) of what is known.
-
-        That of perspective, (2, 2), is known of the target.
-        """
-        weight, right = np.zeros((2, EDGES + formed.edges.size))
-        weight[:] = _HARDLY
-        weight[PRINT] = self.deviations[:3] ** -2
-        right[PRINT] = (self.values[:3] - formed.of_print) * weight[PRINT]
-        values, scales = formed.of_light(patch.light_size)
-        known = (scales / self.deviations[3:]) ** 2
-        of_edges, to_usual = (of[EDGES:].reshape(-1, OF_EDGE) for of in (weight, right))
-        of_edges[:] = np.array(_NEAR) ** -2
-        of_edges[:, OF_LIGHT] += known
-        to_usual[:, OF_LIGHT] = (self.values[3:] - values) / scales * known
-        normal = np.diag(weight)
-        normal[PERSPECTIVE, PERSPECTIVE] += perspective
-        right[PERSPECTIVE] -= perspective @ formed.frame[2, :2]
-        return normal, right
-
 
 def fitted(patch: Patch, formed: Formed, usual: Usual, most: float = math.inf) -> Fit:
-    """Return what forms the pixels of a target, from what nearly does.
+    """Return what forms the pixels of a target, from what nearly does, by the kernel.
 
     What costs far more than `most` after a round, or more after another, is not fitted to the end.
     """
-    seen, damping = patch.seen, _DAMPING[0]
-    weights = 1 / usual.variances(seen)
-    plain, changes = patch.shown(formed), patch.changes(formed)
-    perspective = usual_perspective(formed.frame[None])[0]
-    for number, outlier in enumerate(_OUTLIERS):
-        paper = _paper(weights, plain, seen)
-        errors = seen - paper * plain
-        variances = usual.variances(paper * plain)
-        relative = errors / np.sqrt(variances)
-        spread = max(NORMAL * float(medians(np.abs(relative)[None])[0]), _LEAST_SPREAD)
-        weights = geman_mcclure(1 / variances, relative / (outlier * spread))
-        free = max(float(weights @ variances) - len(changes), _FREE)
-        best = float(weights @ errors**2)
-        each = free / max(best, 1e-9)
-        columns = np.concatenate([paper * changes, plain[None]])
-        normal = each * (columns * weights) @ columns.T
-        right = each * columns @ (weights * errors)
-        known, towards = usual.prior(patch, formed, perspective)
-        normal[:-1, :-1] += known
-        right[:-1] += towards
-        before = formed, plain
-        for _ in range(_TRIALS):
-            change = np.linalg.solve(normal + damping * np.diag(np.diag(normal)), right)[:-1]
-            formed = before[0].changed(change, patch.most_shift)
-            plain = patch.shown(formed)
-            errors = seen - _paper(weights, plain, seen) * plain
-            if float(weights @ errors**2) <= best * (1 + _DAMPING[1]):
-                damping = max(damping / 5, _DAMPING[1])
-                break
-            damping = max(10 * damping, _DAMPING[0])
-        else:
-            formed, plain = before
-            break
-        moved = np.hypot(*(formed.frame - before[0].frame)[:2, 2])
-        moved = max(moved, *np.abs(change[[SHIFT, BLUR]]) / _BY_PLACE)
-        if moved < _STAYING:
-            break
-        if most < math.inf:
-            shown = _paper(weights, plain, seen) * plain
-            if Fit(patch, formed, shown, normal).cost(usual) > (most if number else 2 * most):
-                break
-        # The derivatives hardly change where the place does not.
-        if moved > _CHANGING or np.abs(change[EDGES:]).max(initial=0.0) > _CHANGING_LIGHT:
-            changes = patch.changes(formed)
-    shown = _paper(weights, plain, seen) * plain
-    return Fit(patch, formed, shown, np.linalg.inv(normal)[:-1, :-1])
-
-
-def _paper(weights: np.ndarray, plain: np.ndarray, seen: np.ndarray) -> float:
-    """Return the gray value of paper in full light."""
-    return float(weights * plain @ seen) / max(float(weights * plain @ plain), 1e-9)
+    parameters = EDGES + formed.edges.size
+    place, values, shown, covariance, cost, *_ = kernels.cctag_fit(
+        *(patch.seen, *patch.formed(formed), *patch.bounds(len(formed.edges))),
+        *(_MOST_OF_FRAME, _MOST, OF_INTERPOLATION, usual.values, usual.deviations, _NEAR),
+        *(usual_perspective(formed.frame[None])[0], _HARDLY, usual.noise, _OUTLIERS),
+        *(NORMAL, _LEAST_SPREAD, _FREE, _TRIALS, *_DAMPING, _STAYING, _BY_PLACE),
+        *(_CHANGING, _CHANGING_LIGHT, _DIFFERENT, _MOST_SQUARED, most),
+    )
+    place = frame.translated(place[None], *patch.corner)[0]
+    covariance = covariance[:parameters, :parameters]
+    return Fit(patch, Formed(place, values), shown, covariance, float(cost[0]))
 
 
 def _noise(fits: list[Fit]) -> tuple[float, float]:

@@ -178,8 +178,8 @@ class _Scene:
         fits = {int(rings.ids[0]): fit} | self._rivals(rings, lights, polarity, fit)
         every = len(self.family.numbers) - 1
         while True:
-            best = min(fits, key=lambda it: fits[it].cost(self.usual))
-            most = fits[best].cost(self.usual) + _BEYOND_DOUBT
+            best = min(fits, key=lambda it: fits[it].cost)
+            most = fits[best].cost + _BEYOND_DOUBT
             flips = [1 << bit for bit in range(every.bit_length())]
             others = [best ^ flip for flip in (*flips, every) if best ^ flip not in fits]
             if not others:
@@ -194,7 +194,7 @@ class _Scene:
             if name != self.family.name:
                 scene = replace(self, family=circle_family(name))
                 rivals += scene._rivals(rings, lights, polarity, fit).values()
-        margin = min(rival.cost(self.usual) for rival in rivals) - fit.cost(self.usual)
+        margin = min(rival.cost for rival in rivals) - fit.cost
         reading = replace(rings, ids=np.array([best]), margin=np.array([_OF_MARGIN * margin]))
         return reading, fit
 
@@ -206,7 +206,7 @@ class _Scene:
         larger = frame.mean_radii(likely.starts[0, first]) / frame.mean_radii(rings.frames)
         begun = frame.scaled(np.repeat(fit.formed.frame[None], len(first), axis=0), larger)
         circles = signed_circles(self.family, numbers)
-        most = fit.cost(self.usual) + _BEYOND_DOUBT
+        most = fit.cost + _BEYOND_DOUBT
         return {
             number: fitted(
                 *(replace(fit.patch, circles=of), replace(fit.formed, frame=start)),

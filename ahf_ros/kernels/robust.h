@@ -1,0 +1,129 @@
+/* Robust statistics, and the small systems of equations that they lead to. */
+
+#ifndef AHF_ROBUST_H
+#define AHF_ROBUST_H
+
+#include <math.h>
+
+#include "kernels.h"
+
+static inline double squared(double x) { return x * x; }
+
+/* Cauchy's weight, halved where the error is 1. */
+static inline double cauchy(double error) { return 1.0 / (1.0 + error * error); }
+
+/* Geman and McClure's weight, of which a quarter is left where the error is 1. */
+static inline double geman_mcclure(double error) { return squared(cauchy(error)); }
+
+/* The derivative of an error times its Geman-McClure weight. */
+static inline double geman_mcclure_gain(double error)
+{
+    double square = error * error;
+    return (1.0 - 3.0 * square) / ((1.0 + square) * squared(1.0 + square));
+}
+
+/* The value of a rank among n, whose order changes: Hoare's algorithm 65, Comm. ACM 4, 1961. */
+static inline double ranked(count n, double values[n], count rank)
+{
+    count low = 0, high = n - 1;
+    while (low < high) {
+        double pivot = values[rank];
+        count i = low, j = high;
+        do {
+            while (values[i] < pivot)
+                i++;
+            while (pivot < values[j])
+                j--;
+            if (i <= j) {
+                double swapped = values[i];
+                values[i++] = values[j];
+                values[j--] = swapped;
+            }
+        } while (i <= j);
+        if (j < rank)
+            low = i;
+        if (rank < i)
+            high = j;
+    }
+    return values[rank];
+}
+
+/* The lower median of selected values, or `empty`. */
+static inline double median(count n, const double values[n], const bool selected[n], double empty,
+                            double scratch[n])
+{
+    count some = 0;
+    for (count i = 0; i < n; i++) {
+        scratch[some] = values[i];
+        some += selected[i];
+    }
+    return some ? ranked(some, scratch, (some - 1) / 2) : empty;
+}
+
+/* Solve a x = b by elimination with pivots; b becomes x. */
+static inline void solve(count n, count m, double a[n][n], double b[n][m])
+{
+    for (count c = 0; c < n; c++) {
+        count pivot = c;
+        for (count i = c + 1; i < n; i++)
+            if (fabs(a[i][c]) > fabs(a[pivot][c]))
+                pivot = i;
+        for (count j = 0; pivot != c && j < n; j++) {
+            double swapped = a[c][j];
+            a[c][j] = a[pivot][j];
+            a[pivot][j] = swapped;
+        }
+        for (count j = 0; pivot != c && j < m; j++) {
+            double swapped = b[c][j];
+            b[c][j] = b[pivot][j];
+            b[pivot][j] = swapped;
+        }
+        for (count i = c + 1; i < n; i++) {
+            double share = a[i][c] / a[c][c];
+            for (count j = c; j < n; j++)
+                a[i][j] -= share * a[c][j];
+            for (count j = 0; j < m; j++)
+                b[i][j] -= share * b[c][j];
+        }
+    }
+    for (count c = n - 1; c >= 0; c--)
+        for (count j = 0; j < m; j++) {
+            for (count i = c + 1; i < n; i++)
+                b[c][j] -= a[c][i] * b[i][j];
+            b[c][j] /= a[c][c];
+        }
+}
+
+static inline double dot(count n, const double a[n], const double b[n])
+{
+    double sum = 0;
+    for (count i = 0; i < n; i++)
+        sum += a[i] * b[i];
+    return sum;
+}
+
+/* Solve weighted least squares, of whose unknowns inverse variances are known before. */
+static inline void least_squares(count m, count n, const double rows[m][n],
+                                 const double weights[m], const double values[m],
+                                 const double prior[n], double normal[n][n],
+                                 double solved[n][n], double unknowns[n])
+{
+    for (count a = 0; a < n; a++) {
+        unknowns[a] = 0;
+        for (count b = 0; b < n; b++)
+            normal[a][b] = a == b ? prior[a] : 0;
+    }
+    for (count j = 0; j < m; j++)
+        for (count a = 0; a < n; a++) {
+            double weighted = weights[j] * rows[j][a];
+            unknowns[a] += weighted * values[j];
+            for (count b = a; b < n; b++)
+                normal[a][b] += weighted * rows[j][b];
+        }
+    for (count a = 0; a < n; a++)
+        for (count b = 0; b < n; b++)
+            solved[a][b] = normal[a][b] = a < b ? normal[a][b] : normal[b][a];
+    solve(n, 1, solved, (double(*)[1])unknowns);
+}
+
+#endif
