@@ -46,6 +46,10 @@ void covered_ground(count k, count m, const float ground[k][2][m], const float b
                     const bool visible[k][2][m], const float shade[k], const float contrast[k],
                     const bool dark[k], float offset, float white, float light_edge,
                     float marked_share, bool covered[k][2][m]);
+void ground_votes(count k, count i, count c, count m, count s, const float gray[i][c][m],
+                  const int64_t row[k], const float white[k][m], const double radii[k][c],
+                  const double least[k], const int64_t beyond[s][m], int64_t votes[k][s],
+                  int64_t outermost[k], int64_t sums[k][c]);
 
 /* bands.c */
 

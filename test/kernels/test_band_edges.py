@@ -163,6 +163,23 @@ def test_covers_are_dark_ground_that_is_no_shadow(seed: int) -> None:
             assert covered[b, side, a] == (dim[side, a] or hidden)
 
 
+@pytest.mark.parametrize('seed', range(6))
+def test_circles_beyond_an_outline_vote_for_it(seed: int) -> None:
+    generator = np.random.default_rng(seed)
+    i, c, m, s, k = 2, 2 + seed, 3, 4, 3
+    gray = generator.integers(0, 4, (i, c, m)).astype(np.float32)
+    row, white = generator.integers(0, i, k), np.full((k, m), 2, np.float32)
+    radii, least = np.tile(np.arange(1.0, c + 1), (k, 1)), generator.uniform(0, 4, k)
+    beyond = generator.integers(0, c + 1, (s, m))
+    votes, outermost, _ = kernels.ground_votes(gray, row, white, radii, least, beyond)
+    for b in range(k):
+        signs = np.sign(gray[row[b]] - 2) * (radii[b] >= least[b])[:, None]
+        assert outermost[b] == signs[-1].sum()
+        for shape in range(s):
+            counted = sum(signs[c - beyond[shape, a] :, a].sum() for a in range(m))
+            assert votes[b, shape] == counted
+
+
 @pytest.mark.parametrize('value', [np.nan, np.inf, -np.inf])
 def test_no_value_leads_beyond_an_array(value: float) -> None:
     gray = np.full((1, 3, 4), value, np.float32)

@@ -335,18 +335,17 @@ def on_dark_ground(
     some = polar.select(bright)
     gap = some.at(np.tile(1 + (inner - 1) * GAP, (len(bright), 1))[..., None]).mean(axis=1)
     aside = np.maximum(SOFT_EDGE * some.blur / some.size, _ASIDE)
-    steps = some.levels(some.gray[some.row]) - some.levels(gap)[..., None]
-    votes = np.sign(steps + _WHITE * np.log(some.contrast)[:, None, None])
-    votes *= (some.radii >= (outer + aside)[:, None])[:, None]
-    beyond = votes[..., ::-1].cumsum(axis=2)
-    ended = np.flatnonzero(beyond[..., 0].sum(axis=1) > 0)
-    if not ended.size:
+    step = np.exp(-_WHITE * np.log(some.contrast))[:, None].astype(np.float32)
+    white = (np.maximum(gap, 0) + np.float32(LOG_OFFSET)) * step - np.float32(LOG_OFFSET)
+    ends, beyond, weight = _outlines(*some.gray.shape[1:], outer)
+    votes, outermost, _ = kernels.ground_votes(
+        some.gray.swapaxes(1, 2), some.row, white, some.radii, outer + aside, beyond
+    )
+    ended = outermost > 0
+    if not ended.any():
         return polar
-    ends, place, weight = _outlines(*votes.shape[1:], outer)
-    beyond = np.pad(beyond[ended], ((0, 0), (0, 0), (0, 1)))
-    score = beyond[:, np.arange(votes.shape[1]), place].sum(axis=2) * weight
     plate = polar.plate.copy()
-    plate[bright[ended]] = ends[score.argmax(axis=1)]
+    plate[bright[ended]] = ends[(votes[ended] * weight).argmax(axis=1)]
     return replace(polar, plate=plate)
 
 
@@ -354,8 +353,7 @@ def on_dark_ground(
 def _outlines(count: int, circles: int, outer: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return radii of discs and squares at some angles, (shapes, m), largest first.
 
-    Then comes how many circles lie beyond, less one, -1 where none does, and what votes for a
-    shape weigh.
+    Then comes how many circles lie beyond, and what votes for a shape weigh.
     """
     radii = np.linspace(_INNERMOST, outer + _MARGIN, circles)
     sizes = radii[radii > outer][::-1]
@@ -365,7 +363,7 @@ def _outlines(count: int, circles: int, outer: float) -> tuple[np.ndarray, np.nd
     ends = ends.reshape(-1, count)
     beyond = circles - np.searchsorted(radii, ends - 1e-9)
     weight = np.tile(np.where(np.isnan(turns), 1, _SQUARE), len(sizes))
-    return np.where(beyond > 0, ends, np.inf), beyond - 1, weight
+    return np.where(beyond > 0, ends, np.inf), beyond, weight
 
 
 def _along(of_targets: np.ndarray, values: np.ndarray) -> np.ndarray:
