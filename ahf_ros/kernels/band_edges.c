@@ -260,31 +260,33 @@ void covered_ground(count k, count m, const float ground[k][2][m], const float b
 
 /* Votes for s outlines of dark ground about bright targets: at each angle, one for each circle
    beyond the outline that is brighter than `white`, less one for each that is darker. Circles
-   nearer than `least` do not vote. `beyond` is the number of circles beyond an outline at an angle;
-   `outermost` is what the last circle votes. */
+   nearer than `least` do not vote. `beyond` is the number of circles beyond an outline at an angle.
+   Where the outermost circle is not brighter, which its votes tell, there are none for outlines. */
 void ground_votes(count k, count i, count c, count m, count s, const float gray[i][c][m],
                   const int64_t row[k], const float white[k][m], const double radii[k][c],
                   const double least[k], const int64_t beyond[s][m], int64_t votes[k][s],
-                  int64_t outermost[k], int64_t sums[k][c])
+                  int64_t outermost[k], int32_t sums[c][m])
 {
     for (count b = 0; b < k; b++) {
         const float(*image)[m] = gray[row_within(row[b], i)];
-        for (count shape = 0; shape < s; shape++)
-            votes[b][shape] = 0;
-        outermost[b] = 0;
-        for (count a = 0; a < m; a++) {
-            int64_t sum = 0;
-            for (count j = 0; j < c; j++) { /* from the outermost circle inwards */
-                count circle = c - 1 - j;
-                float here = image[circle][a];
-                if (radii[b][circle] >= least[b])
-                    sum += (here > white[b][a]) - (here < white[b][a]);
-                sums[b][j] = sum;
+        for (count j = 0; j < c; j++) { /* from the outermost circle inwards */
+            count circle = c - 1 - j;
+            int32_t counts = radii[b][circle] >= least[b];
+            const float *here = image[circle], *bound = white[b];
+            for (count a = 0; a < m; a++) {
+                int32_t vote = (here[a] > bound[a]) - (here[a] < bound[a]);
+                sums[j][a] = (j > 0 ? sums[j - 1][a] : 0) + counts * vote;
             }
-            outermost[b] += sums[b][0];
-            for (count shape = 0; shape < s; shape++)
+        }
+        outermost[b] = 0;
+        for (count a = 0; a < m; a++)
+            outermost[b] += sums[0][a];
+        for (count shape = 0; shape < s; shape++) {
+            int64_t sum = 0;
+            for (count a = 0; a < m && outermost[b] > 0; a++)
                 if (beyond[shape][a] > 0)
-                    votes[b][shape] += sums[b][row_within(beyond[shape][a] - 1, c)];
+                    sum += sums[row_within(beyond[shape][a] - 1, c)][a];
+            votes[b][shape] = sum;
         }
     }
 }

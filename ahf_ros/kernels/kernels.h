@@ -49,7 +49,7 @@ void covered_ground(count k, count m, const float ground[k][2][m], const float b
 void ground_votes(count k, count i, count c, count m, count s, const float gray[i][c][m],
                   const int64_t row[k], const float white[k][m], const double radii[k][c],
                   const double least[k], const int64_t beyond[s][m], int64_t votes[k][s],
-                  int64_t outermost[k], int64_t sums[k][c]);
+                  int64_t outermost[k], int32_t sums[c][m]);
 
 /* bands.c */
 
@@ -84,16 +84,12 @@ void predicted_angles(count k, count m, const float best[k][m], const float furt
 
 /* cctag_pixels.c */
 
-/* Gray values of the known pixels about a CCTag where paper in full light is 1, and derivatives by
-   all parameters. */
 void cctag_pixels(count h, count w, count n, count c, count q, const bool known[h][w],
                   const double circles[c], const double light[3][3], double light_size,
                   double gamma, double sharpening, double mask, const double frame[3][3],
                   const double values[q], double shown[n], float derivatives[n][27],
                   float rows[32][2][w], float lines[20][w], float of_h[2][h], float of_w[2][w],
                   float mixed[h][20][w], float scratch[h][20][w]);
-
-/* The same fitted to gray values that are seen. */
 void cctag_fit(count h, count w, count n, count c, count q, count rounds,
                const float seen[n], const bool known[h][w], const double circles[c], const double light[3][3],
                double light_size, double gamma, double sharpening, double mask,
