@@ -82,6 +82,27 @@ void best_moves(count k, count n, count m, count v, const float looks[k][n][m],
 void predicted_angles(count k, count m, const float best[k][m], const float further[k], float price,
                       bool predicted[k][m], float bounded[k][m]);
 
+/* cctag_light.c */
+
+/* ln of the light about targets in frames, `there`, of that of their light; what blur adds to it
+   where ink changes as well, by its slope along the radius; and light with both. */
+void cctag_light(count k, count m, count n, const double there[k][3][3],
+                 const double directions[2][m], const double radii[n], const double heights[k][5],
+                 const double edges[k][3][5], const double width[k], const double blur[k],
+                 const float slope[k][n], double most, float plain[k][m][n], float mixed[k][m][n],
+                 float light[k][m][n], float rows[2][n]);
+
+/* Edges of light that some settle at, or that are known if there are no rounds, and the heights of
+   slopes, moves of frames and edges. */
+void cctag_edges(count k, count m, count n, const float values[k][m][n],
+                 const float weight[k][m][n], const float slope[k][n], const double width[k],
+                 const double area[k], const double start[k][3][5], int16_t number,
+                 const float places[2][m][n], const float around[4][m][n], int16_t rounds,
+                 double usual_moves, const double deviations[4], double least_variance,
+                 double most_moved, double most_curved, double highest, double edges[k][3][5],
+                 double heights[k][9], float rest[k][m][n], double variance[k],
+                 float basis[21][m][n], float planes[5][m][n], float columns[3][n]);
+
 /* cctag_pixels.c */
 
 void cctag_pixels(count h, count w, count n, count c, count q, const bool known[h][w],

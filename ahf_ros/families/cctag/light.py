@@ -15,12 +15,12 @@ from itertools import product
 
 import numpy as np
 
+from ahf_ros import kernels
 from ahf_ros.families.cctag.rays import BLACK, PROFILE, RAYS, Limits, Seen, clipped, ray_angles
 from ahf_ros.families.cctag.templates import less_lines
 from ahf_ros.vision import frame
 from ahf_ros.vision.array_record import ArrayRecord
-from ahf_ros.vision.normal import normal_integral
-from ahf_ros.vision.sampling import circle_places, sample_circles
+from ahf_ros.vision.sampling import sample_circles
 
 _EVERY = 2  # one of so many angles and radii is looked at
 _ANGLES, _RADII = ray_angles(RAYS)[::_EVERY], PROFILE[::_EVERY].astype(np.float32)
@@ -70,22 +70,9 @@ class Lights(ArrayRecord):
 
     def at(self, frames: np.ndarray, angles: np.ndarray, radii: np.ndarray) -> np.ndarray:
         """Return the light at angles (m,) and radii (n,) of frames, float32, shape (k, m, n)."""
-        there = np.linalg.inv(self.frames) @ frames
-        x, y = circle_places(there, angles, radii)
-        heights = self.heights.astype(np.float32)[..., None, None]
-        light = heights[:, 0] * x + heights[:, 1] * y
-        size = frame.mean_radii(self.frames)
-        for number in range(self.edges.shape[1]):
-            some = np.flatnonzero(self.heights[:, 2 + number])
-            if not len(some):
-                continue
-            edge = self.edges[some, number : number + 1]
-            own = some if len(some) < len(x) else slice(None)  # no copy of all
-            step = _steps(edge, x[own, None], y[own, None], usual_widths(size[some]))[:, 0]
-            light[some] += heights[some, 2 + number] * step
+        there, size = np.linalg.inv(self.frames) @ frames, frame.mean_radii(self.frames)
         slope = _interpolated(self.slope, radii)
-        light += _mixed(light, slope, _LENS / size, radii[1] - radii[0])
-        return np.exp(light.clip(-_MOST_LIGHT, _MOST_LIGHT))
+        return _formed(there, angles, radii, self.heights, self.edges, size, slope)[2]
 
     @staticmethod
     def about(gray: np.ndarray, frames: np.ndarray, most: int = EDGES) -> Lights:
@@ -98,26 +85,26 @@ class Lights(ArrayRecord):
         slope = np.zeros((count, len(_RADII)), np.float32)
         if count:
             scene = _Scene.of(gray, frames, size)
-            fit = scene.fit(edges[:, :0])
-            slope[:], heights[:, :_OTHERS] = scene.slope, fit.heights
+            fit = scene.fit(edges)
+            slope[:], heights[:] = scene.slope, fit.heights
             tilt = np.einsum('ks,smn->kmn', fit.heights[:, :2], np.stack([_X, _Y]))
             plain = _less_means(scene.values - tilt, scene.weight, _PAPER)
             rows = np.arange(count)
         for number in range(most if count else 0):
             if number < 2:
                 first = _first_look(plain[rows], size[rows], number + 1)
+                first = np.pad(first, ((0, 0), (0, EDGES - number - 1), (0, 0)))
             else:
-                first = _first_look(fit.rest, size[rows], 1)
-                first = np.concatenate([fit.edges, first], axis=1)
-            more = scene.settled(first)
+                first = fit.edges.copy()
+                first[:, number:] = _first_look(fit.rest, size[rows], 1)
+            more = scene.fit(first, number + 1, _ROUNDS)
             better = scene.area * np.log(fit.variance / more.variance) > _EVIDENCE
             if not better.any():
                 break
             rows, more = rows[better], more.select(better)
             scene = scene.select(better).in_light(more)
-            fit = scene.fit(more.edges)
-            slope[rows], edges[rows, : number + 1] = scene.slope, fit.edges
-            heights[rows, : _OTHERS + number + 1] = fit.heights
+            fit = scene.fit(more.edges, number + 1)
+            slope[rows], edges[rows], heights[rows] = scene.slope, fit.edges, fit.heights
         changes = np.zeros((count, 5))
         changes[:, _MOVES] = np.clip(heights[:, 2:_OTHERS], -_MOST_MOVED, _MOST_MOVED)
         of_light = np.delete(heights, np.s_[2:_OTHERS], axis=1)
@@ -151,7 +138,7 @@ def shares_alike(gray: np.ndarray, frames: np.ndarray) -> np.ndarray:
     if not len(frames):
         return np.zeros(0)
     scene = _Scene.of(gray, frames, frame.mean_radii(frames))
-    slopes = scene.fit(np.zeros((len(frames), 0, 5))).heights.astype(np.float32)[..., None, None]
+    slopes = scene.fit(np.zeros((len(frames), EDGES, 5))).heights[..., None, None].astype('f4')
     values = np.exp(scene.seen - slopes[:, 0] * _X - slopes[:, 1] * _Y)
     values /= values.mean(axis=2, keepdims=True)
     means, rays = less_lines(values.mean(axis=1), _EVERY), less_lines(values, _EVERY)
@@ -162,8 +149,8 @@ def shares_alike(gray: np.ndarray, frames: np.ndarray) -> np.ndarray:
 class _Fit(ArrayRecord):
     """Light that is fitted to targets."""
 
-    edges: np.ndarray  # (k, e, 5)
-    heights: np.ndarray  # (k, 6 + e): slopes, moves of the frame, and edges
+    edges: np.ndarray  # (k, 3, 5)
+    heights: np.ndarray  # (k, 9): slopes, moves of the frame, and edges
     rest: np.ndarray  # (k, m, n)
     variance: np.ndarray  # (k,)
 
@@ -178,8 +165,6 @@ class _Scene(ArrayRecord):
     slope: np.ndarray  # of what is the same all around, by the radius, (k, n)
     size: np.ndarray  # px, (k,)
     area: np.ndarray  # of what is not clipped, px, (k,)
-    smooth: np.ndarray  # slopes of light and moves of the frame, less means, (k, 6, m n)
-    changing: np.ndarray  # values less means of circles, (k, m n)
 
     @staticmethod
     def of(gray: np.ndarray, frames: np.ndarray, size: np.ndarray) -> _Scene:
@@ -193,98 +178,26 @@ class _Scene(ArrayRecord):
         values = np.log(values)
         area = np.pi * (_RADII[-1] * size) ** 2 * known.mean(axis=(1, 2))
         slope = _slopes(values, weight)
-        return _Scene(values, values, weight, slope, size, area, *_smooth(values, weight, slope))
+        return _Scene(values, values, weight, slope, size, area)
 
     def in_light(self, fit: _Fit) -> _Scene:
         """Return what is seen in a light that is known."""
-        heights = fit.heights.astype(np.float32)[..., None, None]
-        light = heights[:, 0] * _X + heights[:, 1] * _Y
-        light = light + (heights[:, _OTHERS:] * self._steps(fit.edges)).sum(axis=1)
-        slope = _slopes(self.values - light, self.weight)
-        values = self.seen - _mixed(light, slope, _LENS / self.size, _STEP)
-        slope = _slopes(values - light, self.weight)
-        smooth, changing = _smooth(values, self.weight, slope)
-        return replace(self, values=values, slope=slope, smooth=smooth, changing=changing)
+        here = np.tile(np.eye(3), (len(self.size), 1, 1))
+        of_light = np.delete(fit.heights, np.s_[2:_OTHERS], axis=1)
+        radii, plain = _RADII.astype(float), np.ones_like(self.slope)
+        known = of_light, fit.edges, self.size, plain
+        light, change, _ = _formed(here, _ANGLES, radii, *known)
+        values = self.seen - change * _slopes(self.values - light, self.weight)[:, None]
+        return replace(self, values=values, slope=_slopes(values - light, self.weight))
 
-    def fit(self, edges: np.ndarray) -> _Fit:
-        """Return the best heights of edges (k, e, 5)."""
-        basis = self._less_means(self._steps(edges))
-        extra = np.zeros((len(basis), _OTHERS + basis.shape[1]))
-        extra[:, 2:_OTHERS] = _USUAL_MOVES
-        heights = self._solved(basis, self.changing, extra, 0.0)
-        of_smooth, of_edges = np.split(heights.astype(np.float32)[:, None], [_OTHERS], axis=2)
-        rest = self.changing - (of_smooth @ self.smooth)[:, 0] - (of_edges @ basis)[:, 0]
-        rest = rest.reshape(self.seen.shape)
-        variance = (self.weight * rest**2).sum(axis=(1, 2)) + _LEAST_VARIANCE
-        return _Fit(edges, heights, rest, variance)
-
-    def settled(self, edges: np.ndarray) -> _Fit:
-        """Return the best edges near to some, (k, e, 5), by Levenberg and Marquardt."""
-        fit, count = self.fit(edges), edges.shape[1]
-        damping = np.full((len(edges), 1), 1e-3)
-        usual = np.tile(np.array(_DEVIATIONS) ** -2.0, count)
-        for _ in range(_ROUNDS):
-            away, across, along = _away(fit.edges, _X, _Y)
-            width = _own_widths(fit.edges, usual_widths(self.size))
-            step, by_share = _logarithms(normal_integral(away / width), fit.edges)
-            density = np.exp(-0.5 * (away / width) ** 2) / width / math.sqrt(2 * math.pi)
-            density *= by_share * fit.heights[:, _OTHERS:, None, None].astype(np.float32)
-            _, offset, curved, *_ = _columns(fit.edges)
-            turn = along * (1 + curved * offset)
-            bend = -(across**2 + along**2) / 2
-            change = np.stack([turn, curved * across - 1, bend, -away], axis=2)
-            change = (density[:, :, None] * change).reshape(len(edges), -1, *_X.shape)
-            basis = self._less_means(np.concatenate([change, step], axis=1))
-            extra = np.zeros((len(edges), _OTHERS + basis.shape[1]))
-            moving = np.s_[:, _OTHERS : _OTHERS + 4 * count]
-            extra[moving] = usual * (fit.variance / self.area)[:, None]
-            move = self._solved(basis, fit.rest, extra, damping)[moving]
-            moved = fit.edges.copy()
-            moved[..., [0, 1, 2, 4]] += np.clip(move, -_MOST_MOVED, _MOST_MOVED).reshape(
-                -1, count, 4
-            )
-            moved[..., 2] = np.clip(moved[..., 2], -_MOST_CURVED, _MOST_CURVED)
-            moved[..., 3] = np.clip(fit.heights[:, _OTHERS:], -_HIGHEST, _HIGHEST)
-            other = self.fit(moved)
-            better = other.variance < fit.variance
-            damping = np.where(better[:, None], np.maximum(damping / 5, 1e-4), 10 * damping)
-            fit = fit.replaced(better, other.select(better))
-        return fit
-
-    def _steps(self, edges: np.ndarray) -> np.ndarray:
-        return _steps(edges, _X, _Y, usual_widths(self.size))
-
-    def _less_means(self, of_edges: np.ndarray) -> np.ndarray:
-        """Return what is of edges (k, b, m, n) less means of circles, (k, b, m n)."""
-        return _flat(_less_means(of_edges, self.weight[:, None]))
-
-    def _solved(
-        self, basis: np.ndarray, rest: np.ndarray, extra: np.ndarray, damping: np.ndarray | float
-    ) -> np.ndarray:
-        """Return what is smooth and what is of edges (k, b, m n) in a rest, (k, 6 + b)."""
-        every = np.concatenate([self.smooth, basis], axis=1)
-        weighted = every * self.weight.reshape(len(every), 1, -1)
-        normal = (weighted @ every.transpose(0, 2, 1)).astype(np.float64)
-        right = (weighted @ rest.reshape(len(every), -1, 1)).astype(np.float64)
-        index = np.arange(normal.shape[1])
-        normal[:, index, index] *= 1 + damping
-        normal[:, index, index] += extra + 1e-7
-        return np.linalg.solve(normal, right)[..., 0]
-
-
-def _smooth(
-    values: np.ndarray, weight: np.ndarray, slope: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return slopes of light and moves of frames, and values (k, m, n), all less means."""
-    slopes = np.broadcast_to(np.stack([_X, _Y]), (len(values), 2, *_X.shape))
-    moves = -slope[:, None, None] * _AROUND
-    smooth = _less_means(np.concatenate([slopes, moves], axis=1), weight[:, None])
-    return _flat(smooth), _less_means(values, weight).reshape(len(values), -1)
-
-
-def _flat(basis: np.ndarray) -> np.ndarray:
-    """Return (k, b, m, n) as (k, b, m n)."""
-    return basis.reshape(*basis.shape[:2], math.prod(basis.shape[2:]))
+    def fit(self, edges: np.ndarray, count: int = 0, rounds: int = 0) -> _Fit:
+        """Return the best heights of the first of edges (k, 3, 5), which settle in some rounds."""
+        found = kernels.cctag_edges(
+            *(self.values, self.weight, self.slope, usual_widths(self.size), self.area, edges),
+            *(count, np.stack([_X, _Y]), _AROUND, rounds, _USUAL_MOVES, _DEVIATIONS),
+            *(_LEAST_VARIANCE, _MOST_MOVED, _MOST_CURVED, _HIGHEST),
+        )
+        return _Fit(*found[:4])
 
 
 def _first_look(rest: np.ndarray, size: np.ndarray, count: int) -> np.ndarray:
@@ -316,7 +229,12 @@ def _first_edges(size: int) -> tuple[np.ndarray, np.ndarray]:
     curved = product(2 * np.pi * np.arange(_CURVED) / _CURVED, _OFFSETS, [_CURVATURE])
     edges = np.pad(np.array([*straight, *curved]), ((0, 0), (0, 2)))
     x, y, weight = _X[_FEW], _Y[_FEW], np.sqrt(_RADII[_FEW])
-    steps = _steps(edges[None], x, y, usual_widths(np.array([_SIZES**size])))[0]
+    here, heights = np.tile(np.eye(3), (len(edges), 1, 1)), np.zeros((len(edges), 2 + EDGES))
+    heights[:, 2] = 1
+    known = here, _ANGLES, _RADII[::2].astype(float), heights
+    padded = np.pad(edges[:, None], ((0, 0), (0, EDGES - 1), (0, 0)))
+    sizes, flat = np.full(len(edges), _SIZES**size), np.zeros((len(edges), len(weight)))
+    steps = _formed(*known, padded, sizes, flat)[0]
     steps = _less_means(steps, np.broadcast_to(weight**2, x.shape), _PAPER // 2) * weight
     steps = steps.reshape(len(edges), -1)
     plane, _ = np.linalg.qr((np.stack([x, y]) * weight).reshape(2, -1).T)
@@ -326,53 +244,29 @@ def _first_edges(size: int) -> tuple[np.ndarray, np.ndarray]:
     return edges[shown], (steps[shown] / length[shown, None]).astype(np.float32)
 
 
-def _columns(edges: np.ndarray) -> tuple[np.ndarray, ...]:
-    """Return the columns of edges (k, e, 5), float32, of shape (k, e, 1, 1)."""
-    edges = edges.astype(np.float32)[..., None, None]
-    return tuple(edges[:, :, column] for column in range(edges.shape[2]))
+def _formed(
+    there: np.ndarray,
+    angles: np.ndarray,
+    radii: np.ndarray,
+    heights: np.ndarray,
+    edges: np.ndarray,
+    size: np.ndarray,
+    slope: np.ndarray,
+) -> tuple[np.ndarray, ...]:
+    """Return ln of light in frames of that of light, what blur adds to it, and light with both.
 
-
-def _away(
-    edges: np.ndarray, x: np.ndarray, y: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the distances of points from edges (k, e, 5), and those across and along them."""
-    direction, offset, curved, *_ = _columns(edges)
-    cosine, sine = np.cos(direction), np.sin(direction)
-    across, along = cosine * x + sine * y - offset, cosine * y - sine * x
-    return across - curved / 2 * (across**2 + along**2), across, along
-
-
-def _steps(edges: np.ndarray, x: np.ndarray, y: np.ndarray, width: np.ndarray) -> np.ndarray:
-    """Return the steps of edges (k, e, 5) at points, in their heights, shape (k, e, m, n)."""
-    share = normal_integral(_away(edges, x, y)[0] / _own_widths(edges, width))
-    return _logarithms(share, edges)[0]
-
-
-def _logarithms(share: np.ndarray, edges: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return steps of ln of light, in their heights, and the derivative by the share of light.
-
-    Blur mixes light, and not its logarithm. No height is 0.
+    Blur adds to it where light and ink change at once, whose slope by the radius has the shape
+    (k, n), to the second order. All others are of the shape (k, m, n).
     """
-    height = _columns(edges)[3]
-    height = np.where(np.abs(height) < 0.01, np.float32(0.01), height)
-    more = np.expm1(height)
-    light = 1 + more * share
-    return np.log(light) / height, more / height / light
-
-
-def _own_widths(edges: np.ndarray, width: np.ndarray) -> np.ndarray:
-    return width[:, None, None, None] * np.exp(_columns(edges)[4])
+    directions, blur = np.stack([np.cos(angles), np.sin(angles)]), (_LENS / size) ** 2
+    known = heights, edges, usual_widths(size), blur, slope
+    formed = kernels.cctag_light(there, directions, radii, *known, _MOST_LIGHT)
+    return tuple(formed[:3])
 
 
 def usual_widths(size: np.ndarray) -> np.ndarray:
     """Return the usual widths of edges, in radii, about targets of so many px."""
     return np.maximum(_WIDTH / size, _SHARPEST).astype(np.float32)
-
-
-def _mixed(light: np.ndarray, slope: np.ndarray, blur: np.ndarray, step: float) -> np.ndarray:
-    """Return what blur adds to ln I where light and ink change at once, to the second order."""
-    change = np.gradient(light, step, axis=2) * (blur**2)[:, None, None]
-    return (change * slope[:, None]).astype(np.float32)
 
 
 def _less_means(basis: np.ndarray, weight: np.ndarray, paper: int = len(_RADII)) -> np.ndarray:
