@@ -127,4 +127,76 @@ void cctag_fit(count h, count w, count n, count c, count q, count rounds,
                float rows[32][2][w], float lines[20][w], float of_h[2][h], float of_w[2][w],
                float mixed[h][20][w], float scratch[h][20][w]);
 
+/* robust.c */
+
+void selected_medians(count k, count m, const double values[k][m], const bool selected[k][m],
+                      double empty, double medians[k], double scratch[m]);
+void linear_fits(count k, count m, count n, const double values[k][m], const double weights[k][m],
+                 const double basis[m][n], const double prior[n], double scale, int16_t rounds,
+                 double unknowns[k][n], double residuals[k][m], double robust[m],
+                 double normal[n][n], double products[m][n][n]);
+
+/* profiles.c */
+
+void edge_points(count k, count m, const double frames[k][3][3], const double points[m][2],
+                 const double normals[m][2], const double curvature[m], const double spacing[m],
+                 double no_length, double images[k][m][2], double outwards[k][m][2],
+                 double scale[k][m], double distance[k][m], double bend[k][m]);
+void profile_groups(count k, count m, count w, count b, const double points[k][m][2],
+                    const double normals[k][m][2], const int16_t polarity[k][m],
+                    const double scale[k][m], const double reach[k], const double enough[k],
+                    const int32_t blurs[k], const double half_widths[w], double right,
+                    double bottom, int32_t groups[k][m], bool used[b][w]);
+void fit_steps(count h, count w, count k, count m, count g, count f, const float gray[h][w],
+               const double points[k][m][2], const double normals[k][m][2],
+               const int16_t polarity[k][m], const double spacing[k][m],
+               const double curvature[k][m], const double blur[k], const int32_t groups[k][m],
+               const double half_widths[g], const int32_t filters[g], const double along[13],
+               const float search[f][13][51], const float parts[f][17][13][18],
+               const double known[f][3][17], double maximum_aside, double minimum_step,
+               double edges[7][k][m], bool visible[k][m]);
+
+/* edge_fit.c */
+
+void edge_weights(count k, count m, const double dark[k][m], const double bright[k][m],
+                  const double residual[k][m], const bool visible[k][m], double log_offset,
+                  double normal, double minimum_contrast, double ratio_doubt,
+                  double minimum_ratio_error, double residual_doubt, double minimum_residual,
+                  double minimum_bright, bool seen[k][m], double weights[k][m],
+                  double contrast[k], double scratch[2][m]);
+void light_slopes(count k, count l, count n, const double slopes[k][l][n],
+                  const int16_t polarity[k][l][n], const double weights[k][l][n],
+                  const float window[n][n], const double prior[k], double sharpened,
+                  double minimum_usual, double outlier, int16_t rounds, double no_weight,
+                  double errors[k][l][n], double smooth[k][l][n], double used[k][l][n],
+                  double totals[k][l][n], float sums[2][n], bool seen[n], double scratch[2][n],
+                  int32_t spans[n][2]);
+void outline_fits(count k, count m, count n, count q, const double offset[k][m],
+                  const double sensitivity[k][m], const double slope[k][m],
+                  const double dark[k][m], const double bright[k][m], const double scale[k][m],
+                  const int16_t polarity[k][m], const bool seen[k][m], const double own[k][m],
+                  const double basis[m][n], const double prior[q], double noise, double uneven,
+                  double minimum_step, double normal, double outlier, double minimum,
+                  bool in_px, int16_t rounds, double unknowns[k][q], double equations[k][q][q],
+                  double errors[k][m], double relative[k][m], double weights[k][m],
+                  double robust[k][m], double products[m][n][n], double scratch[6][m]);
+
+/* edge_errors.c */
+
+void edge_parts(count k, count m, count n, count q, const double basis[m][n],
+                const int16_t polarity[k][m], const double scale[k][m],
+                const double sensitivity[k][m], const double equations[k][q][q],
+                const double own[k][m], const double relative[k][m], const double weights[k][m],
+                const double robust[k][m], const double errors[k][m],
+                const double light_errors[k][m], const double light_weights[k][m],
+                const double light_totals[k][m], const float window[m][m], double minimum_gain,
+                double no_weight, double parts[k][2][m], double used[k][m], double inverse[q][2],
+                float slopes[m]);
+void errors_in_common(count k, count m, const double errors[k][m], const double outline[m],
+                      int16_t disturbed, double no_error, double growth[k]);
+void edge_covariances(count k, count m, const double parts[k][2][m], const double weights[k][m],
+                      const double spacing[k][m], double unknowns, const double common[k],
+                      double correlation, double sharing, double no_weight,
+                      double covariance[k][2][2]);
+
 #endif

@@ -102,28 +102,58 @@ static inline double dot(count n, const double a[n], const double b[n])
     return sum;
 }
 
-/* Solve weighted least squares, of whose unknowns inverse variances are known before. */
-static inline void least_squares(count m, count n, const double rows[m][n],
-                                 const double weights[m], const double values[m],
-                                 const double prior[n], double normal[n][n],
-                                 double solved[n][n], double unknowns[n])
+/* Set the products of each pair of columns of a basis; those of a row follow each other. */
+static inline void set_products(count m, count n, const double basis[m][n],
+                                double products[m][n][n])
 {
-    for (count a = 0; a < n; a++) {
-        unknowns[a] = 0;
-        for (count b = 0; b < n; b++)
-            normal[a][b] = a == b ? prior[a] : 0;
-    }
+    double *product = products[0][0];
     for (count j = 0; j < m; j++)
-        for (count a = 0; a < n; a++) {
-            double weighted = weights[j] * rows[j][a];
-            unknowns[a] += weighted * values[j];
+        for (count a = 0; a < n; a++)
             for (count b = a; b < n; b++)
-                normal[a][b] += weighted * rows[j][b];
-        }
+                *product++ = basis[j][a] * basis[j][b];
+}
+
+/* Solve weighted least squares of q unknowns, whose inverse variances before are `prior`.
+
+   Their derivatives are the n columns of a basis, whose products are known, and one of its own if
+   q is n + 1. */
+static inline void least_squares(count m, count n, count q, const double basis[m][n],
+                                 const double products[m][n][n], const double own[m],
+                                 const double weights[m], const double values[m],
+                                 const double prior[q], double normal[q][q], double unknowns[q])
+{
+    count pairs = n * (n + 1) / 2;
+    const double *product = products[0][0];
+    double sums[pairs], mixed[n], right[n], square = 0, last = 0, solved[q][q];
+    for (count pair = 0; pair < pairs; pair++)
+        sums[pair] = 0;
     for (count a = 0; a < n; a++)
-        for (count b = 0; b < n; b++)
-            solved[a][b] = normal[a][b] = a < b ? normal[a][b] : normal[b][a];
-    solve(n, 1, solved, (double(*)[1])unknowns);
+        mixed[a] = right[a] = 0;
+    for (count j = 0; j < m; j++) {
+        double weight = weights[j], value = weight * values[j];
+        for (count pair = 0; pair < pairs; pair++)
+            sums[pair] += weight * *product++;
+        for (count a = 0; a < n; a++)
+            right[a] += value * basis[j][a];
+        if (q > n) {
+            weight *= own[j];
+            square += weight * own[j];
+            last += value * own[j];
+            for (count a = 0; a < n; a++)
+                mixed[a] += weight * basis[j][a];
+        }
+    }
+    for (count a = 0, pair = 0; a < q; a++)
+        for (count b = a; b < q; b++) {
+            double sum = b < n ? sums[pair++] : a < n ? mixed[a] : square;
+            normal[a][b] = normal[b][a] = a == b ? sum + prior[a] : sum;
+        }
+    for (count a = 0; a < q; a++) {
+        unknowns[a] = a < n ? right[a] : last;
+        for (count b = 0; b < q; b++)
+            solved[a][b] = normal[a][b];
+    }
+    solve(q, 1, solved, (double(*)[1])unknowns);
 }
 
 #endif

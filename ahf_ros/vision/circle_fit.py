@@ -8,6 +8,7 @@ from typing import Literal
 
 import numpy as np
 
+from ahf_ros import kernels
 from ahf_ros.vision import frame
 from ahf_ros.vision.array_record import ArrayRecord
 from ahf_ros.vision.edge_errors import (
@@ -15,7 +16,6 @@ from ahf_ros.vision.edge_errors import (
     EdgeWeights,
     LightSlope,
     common_errors,
-    common_slope,
     edge_covariance,
     smooth_slopes,
     unevenness,
@@ -23,7 +23,7 @@ from ahf_ros.vision.edge_errors import (
 from ahf_ros.vision.edge_fit import WEAK_PRIOR, EdgeFit, EdgeKind, Outlines, fit_edges
 from ahf_ros.vision.growth import growth_in_light
 from ahf_ros.vision.profiles import BLURS, USUAL_BLUR, Edges
-from ahf_ros.vision.robust import geman_mcclure, geman_mcclure_gain, median
+from ahf_ros.vision.robust import median
 
 ENOUGH = 0.5
 """Share of the expected edges from which a fit counts."""
@@ -38,7 +38,9 @@ _PLACED, _PLACED_RADII = 4 / 3, 0.08  # error of an edge in its place: in outlie
 _MINIMUM_GAIN = 0.2  # where many errors lie beyond the turning point of the weight function
 _MAXIMUM_CHANGE = 0.3  # of a frame in one measurement, dot radii
 _LIGHT_REACH = 0.3  # standard deviation of the window in which the light is even, dot radii
+_LIGHT_ROUNDS = 2  # of its smoothing
 _LIGHT_PRIOR = 5.0  # px of whole edges that say as much of the slope as the prior, none, does
+_FAR = 5.5 * _LIGHT_REACH  # from where on light tells nothing of a point
 _SHARPENED = 0.03  # slope of all edges that makes single slopes doubtful, 1/px
 _UNEVEN = 0.011  # usual error of slopes where light is no slope within a profile, 1/px
 # Of the variance of whole targets: a factor, px, by how uneven light is about the dot, and how
@@ -225,7 +227,7 @@ def fit_circles(
     squares = np.where(placed, errors * edges.scale, 0) ** 2
     covariance = np.full((len(frames), 2, 2), np.nan)
     if covariances:
-        covariance = _covariance(fit, frames, circles, projective)
+        covariance = _covariance(fit, frames, circles, kind, projective)
     return Fit(
         frames=moved,
         polarity=circles.polarity[:, 0],
@@ -264,41 +266,55 @@ def _kind(circles: Outlines, *, projective: bool, uneven: bool) -> EdgeKind:
         prior = np.concatenate([prior, np.array(deviations) ** -2])
     else:
         basis = basis[:, :5]
-    window = _window(circles.points.tobytes(), circles.line.tobytes())
+    window = _light_window(circles)
 
     def smooth(edges: Edges, own: EdgeWeights, polarity: np.ndarray) -> LightSlope:
-        common = common_slope(edges.slope, polarity, own.weights)
-        prior = _LIGHT_PRIOR / edges.scale.mean(axis=1, keepdims=True)
-        # Where edges were sharpened, none of their slopes is the light's.
-        prior *= (1 + (common / _SHARPENED) ** 2) ** 2
-        return smooth_slopes(edges.slope - polarity * common, own.weights, window, prior)
+        prior = _LIGHT_PRIOR / edges.scale.mean(axis=1)
+        return smooth_slopes(
+            edges, polarity, own.weights, window, prior, _SHARPENED, _LIGHT_ROUNDS
+        )
 
     relative_to: Literal['noise', 'light'] = 'light' if uneven else 'noise'
     return EdgeKind(basis, prior, smooth, relative_to, _MINIMUM_SPREAD, _ROUNDS)
 
 
 def _covariance(
-    of: EdgeFit, frames: np.ndarray, circles: Outlines, projective: bool
+    of: EdgeFit, frames: np.ndarray, circles: Outlines, kind: EdgeKind, projective: bool
 ) -> np.ndarray:
     """Return the covariances of the centres, shape (k, 2, 2), squared dot radii."""
-    edges = of.edges
-    # What an error changes is not its weight times the error, but the derivative of that.
-    gain = geman_mcclure_gain(of.weights, of.relative).sum(axis=1)
-    gain = np.maximum(gain / np.maximum(of.robust.sum(axis=1), NO_WEIGHT), _MINIMUM_GAIN)
-    influence = of.model.influence(of.normal) * (of.robust / gain[:, None])[:, None]
-    parts = influence * of.errors[:, None]
-    parts -= of.light.influence(influence * (edges.sensitivity / edges.scale)[:, None])
-    used = geman_mcclure(of.own.weights, of.relative)
+    edges, light = of.edges, of.light
+    parts, used, *_ = kernels.edge_parts(
+        kind.basis,
+        circles.polarity,
+        edges.scale,
+        edges.sensitivity,
+        of.normal,
+        of.own.weights,
+        of.relative,
+        of.weights,
+        of.robust,
+        of.errors,
+        light.errors,
+        light.weights,
+        light.totals,
+        _light_window(circles),
+        _MINIMUM_GAIN,
+        NO_WEIGHT,
+    )
     common = common_errors(used * of.errors * edges.scale, circles.line)
     covariance = edge_covariance(parts, used, edges.spacing, of.normal.shape[1], common)
     short = np.minimum(frame.mean_radii(frames) / _LONG, 1) ** 2
     if projective:
         dot = circles.group == 0
-        uneven = unevenness(of.light.errors[:, dot], used[:, dot])
+        uneven = unevenness(light.errors[:, dot], used[:, dot])
         variance = _OF_LIGHT * (uneven + _EVEN) * short
     else:
-        variance = 1 + short * np.minimum((unevenness(of.light.errors, used) / _UNEVEN) ** 2, 1)
+        variance = 1 + short * np.minimum((unevenness(light.errors, used) / _UNEVEN) ** 2, 1)
     return np.asarray(covariance * variance[:, None, None])
+
+
+def _light_window(circles: Outlines) -> np.ndarray:
+    return _window(circles.points.tobytes(), circles.line.tobytes())
 
 
 @lru_cache(maxsize=8)  # up to two megabytes each; the same circles are fitted again and again
@@ -308,7 +324,7 @@ def _window(points: bytes, lines: bytes) -> np.ndarray:
     lengths = (places**2).sum(axis=1)
     squares = lengths[:, None] + lengths - 2 * places @ places.T
     squares[line[:, None] != line] = np.inf
-    window = np.exp(-0.5 * squares / _LIGHT_REACH**2)
+    window = np.where(squares < _FAR**2, np.exp(-0.5 * squares / _LIGHT_REACH**2), 0)
     window = (window / window.sum(axis=0)).astype(np.float32)
     window.flags.writeable = False
     return window

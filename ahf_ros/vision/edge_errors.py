@@ -13,9 +13,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ahf_ros import kernels
 from ahf_ros.vision.logarithm import LOG_OFFSET
 from ahf_ros.vision.profiles import CORRELATION, Edges
-from ahf_ros.vision.robust import cauchy, median, spread
+from ahf_ros.vision.robust import NORMAL
 
 NO_WEIGHT = 1e-9
 """Divisor instead of a sum of no weights."""
@@ -44,33 +45,20 @@ class EdgeWeights:
 
 def weigh_edges(edges: Edges) -> EdgeWeights:
     """Separate edges of targets from edges of light, by the usual edge of each target."""
-    dark, bright = np.maximum(edges.dark, 0), np.maximum(edges.bright, 0)
-    step = np.log((bright + LOG_OFFSET) / (dark + LOG_OFFSET))
-    usual = median(step, edges.visible)[:, None]
-    seen = edges.visible & (step > _MINIMUM_CONTRAST * usual) & (step > 0)
-    ratio = dark / np.maximum(bright, _MINIMUM_BRIGHT)
-    contrast = median(ratio, seen)
-    errors = np.abs(ratio - contrast[:, None])
-    by_ratio = cauchy(1.0, errors / (_RATIO_DOUBT * spread(errors, seen, _MINIMUM_RATIO_ERROR)))
-    usual = np.maximum(median(edges.residual, seen), _MINIMUM_RESIDUAL)[:, None]
-    excess = np.maximum(edges.residual / usual - 1, 0)
-    return EdgeWeights(seen, seen * cauchy(by_ratio, excess / _RESIDUAL_DOUBT), contrast)
+    of_ratio = NORMAL, _MINIMUM_CONTRAST, _RATIO_DOUBT, _MINIMUM_RATIO_ERROR
+    of_residual = _RESIDUAL_DOUBT, _MINIMUM_RESIDUAL, _MINIMUM_BRIGHT
+    measured = edges.dark, edges.bright, edges.residual, edges.visible
+    return EdgeWeights(*kernels.edge_weights(*measured, LOG_OFFSET, *of_ratio, *of_residual)[:3])
 
 
 @dataclass(frozen=True, slots=True)
 class LightSlope:
     """The smoothed slope of the light at m points on the outlines of k targets, shape (k, m)."""
 
-    slope: np.ndarray  # outwards, as a share of the light, 1/px
     errors: np.ndarray  # of the slopes of the single profiles, 1/px
-    weights: np.ndarray  # of these
+    slope: np.ndarray  # outwards, as a share of the light, 1/px
+    weights: np.ndarray  # of the single profiles
     totals: np.ndarray  # weight that each smoothed slope is made from
-    window: np.ndarray  # (n, n), what each profile, by row, adds to each smoothed slope
-
-    def influence(self, of_slopes: np.ndarray) -> np.ndarray:
-        """Return what the errors do, given what the smoothed slopes do, shape (k, c, n) both."""
-        of_profiles = (of_slopes / self.totals[:, None]).astype(self.window.dtype) @ self.window.T
-        return of_profiles * (self.weights * self.errors)[:, None]
 
 
 def unevenness(errors: np.ndarray, weights: np.ndarray) -> np.ndarray:
@@ -83,42 +71,29 @@ def unevenness(errors: np.ndarray, weights: np.ndarray) -> np.ndarray:
     return np.sqrt(squares)
 
 
-def common_slope(slopes: np.ndarray, polarity: np.ndarray, weights: np.ndarray) -> np.ndarray:
-    """Return the mean slope towards the bright side of edges, shape (k, 1), all others (k, m).
-
-    It is not the light's: the blur is not the fitted step's, or edges were sharpened.
-    """
-    total = np.maximum(weights.sum(axis=1), NO_WEIGHT)
-    return ((weights * polarity * slopes).sum(axis=1) / total)[:, None]
-
-
 def smooth_slopes(
-    slopes: np.ndarray,
+    edges: Edges,
+    polarity: np.ndarray,
     weights: np.ndarray,
     window: np.ndarray,
-    prior: np.ndarray | float,
-    rounds: int = 2,
+    prior: np.ndarray,
+    sharpened: float,
+    rounds: int,
 ) -> LightSlope:
-    """Smooth the slopes of profiles, with weights, both of shape (k, m), along outlines.
+    """Smooth slopes of profiles along outlines, by weights of shape (k, m) as the polarity.
 
-    `window`, shape (n, n), says how much each of the n profiles of an outline, by row, tells of
-    the light at each. The prior, a number or of shape (k, 1), is the weight that tells as much as
-    the belief that there is no slope. In each round but the first, outliers among the profiles
-    have lost weight.
+    The mean slope towards the bright side is not the light's: the blur is not the fitted step's,
+    or edges were sharpened. `window`, float32, shape (n, n), says how much each of the n profiles
+    of an outline, by row, tells of the light at each. The prior, shape (k,), is the weight that
+    tells as much as the belief that there is no slope, or four times as much where the mean one is
+    `sharpened`, 1/px. In each round but the first, outliers among the profiles have lost weight.
     """
-    shape = slopes.shape
-    slopes, weights = (of.reshape(-1, len(window)) for of in (slopes, weights))
-    seen = weights > 0
-    middle = median(slopes, seen)[:, None]
-    usual = np.maximum(median(np.abs(slopes - middle), seen), _MINIMUM_USUAL)[:, None]
-    robust = weights
-    for _ in range(rounds):
-        totals = robust.astype(window.dtype) @ window + prior
-        smooth = (robust * slopes).astype(window.dtype) @ window / totals
-        errors = slopes - smooth
-        used, robust = robust, cauchy(weights, errors / (_OUTLIER * usual))
-    smooth, errors = smooth.reshape(shape), errors.reshape(shape)
-    return LightSlope(smooth, errors, used.reshape(shape), totals.reshape(shape), window)
+    count, points = shape = polarity.shape
+    of_lines = count, points // len(window), len(window)
+    lines = (of.reshape(of_lines) for of in (edges.slope, polarity, weights))
+    numbers = sharpened, _MINIMUM_USUAL, _OUTLIER, rounds, NO_WEIGHT
+    smooth = kernels.light_slopes(*lines, window, prior, *numbers)[:4]
+    return LightSlope(*[of.reshape(shape) for of in smooth])
 
 
 def grouped_covariance(normals: np.ndarray, sums: np.ndarray) -> np.ndarray:
@@ -154,13 +129,8 @@ def common_errors(errors: np.ndarray, outline: np.ndarray) -> np.ndarray:
     >>> common_errors(np.stack([alternating, pairs, np.ones(100)]), outline).round(1)
     array([1. , 1. , 6.8])
     """
-    total = np.maximum((errors**2).sum(axis=1), _NO_ERROR)
-    growth = np.ones(len(errors))
-    for steps in range(1, _DISTURBED + 1):
-        same = (outline[steps:] == outline[:-steps]).astype(np.float64)
-        products = (errors[:, steps:] * errors[:, :-steps]) @ same
-        growth += 2 * (1 - steps / (_DISTURBED + 1)) * products / total
-    return np.maximum(growth, 1.0)
+    growth: np.ndarray = kernels.errors_in_common(errors, outline, _DISTURBED, _NO_ERROR)
+    return growth
 
 
 def edge_covariance(
@@ -178,12 +148,6 @@ def edge_covariance(
     they are: a fit of some unknowns leaves little of what they have in common. The growth by
     `common_errors`, shape (k,), counts where it is more than shared pixels explain.
     """
-    distance = np.maximum(spacing / CORRELATION, 1 / _SHARING)
-    alike = np.ones_like(distance)
-    for steps in range(1, _SHARING):
-        alike += 2 * np.maximum(1 - steps * distance, 0)
-    squares = (weights**2 * alike).sum(axis=1)
-    count = weights.sum(axis=1) ** 2 / np.maximum(squares, NO_WEIGHT)
-    shared = np.maximum(squares / np.maximum((weights**2).sum(axis=1), NO_WEIGHT), 1)
-    free = count / np.maximum(count - unknowns, 1) * np.maximum(common / shared, 1)
-    return free[:, None, None] * ((parts * alike[:, None]) @ parts.transpose(0, 2, 1))
+    of_errors = parts, weights, spacing, unknowns, common
+    covariance: np.ndarray = kernels.edge_covariances(*of_errors, CORRELATION, _SHARING, NO_WEIGHT)
+    return covariance

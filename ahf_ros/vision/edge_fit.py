@@ -16,9 +16,10 @@ from typing import Literal
 
 import numpy as np
 
+from ahf_ros import kernels
 from ahf_ros.vision.edge_errors import EdgeWeights, LightSlope, weigh_edges
 from ahf_ros.vision.profiles import USUAL_BLUR, Edges, OutlinePoints, measure_outlines
-from ahf_ros.vision.robust import median, reweight, spread
+from ahf_ros.vision.robust import NORMAL
 
 WEAK_PRIOR = 1e-6
 """Inverse variance of an unknown of which nothing is known, so that it can be solved for."""
@@ -52,24 +53,9 @@ class Outlines:
 
 def edge_points(frames: np.ndarray, outlines: Outlines) -> OutlinePoints:
     """Return where the outlines of targets with frames (k, 3, 3) have edges in the image."""
-    normals = outlines.normals.T
-    images = frames[:, :, :2] @ outlines.points.T + frames[:, :, 2:]
-    depth = images[:, 2:]
-    points = images[:, :2] / depth
-    outwards, along = (
-        (moved[:, :2] - points * moved[:, 2:]) / depth
-        for moved in (frames[:, :, :2] @ of for of in (normals, [-normals[1], normals[0]]))
-    )
-    stretch = np.maximum(np.hypot(along[:, 0], along[:, 1]), _NO_LENGTH)
-    area = outwards[:, 0] * along[:, 1] - outwards[:, 1] * along[:, 0]
-    return OutlinePoints(
-        points=points.transpose(0, 2, 1),
-        normals=np.stack([along[:, 1], -along[:, 0]], axis=2) / stretch[..., None],
-        polarity=outlines.polarity,
-        scale=np.maximum(area / stretch, _NO_LENGTH),
-        spacing=outlines.spacing * stretch,
-        curvature=outlines.curvature * area / stretch**3,
-    )
+    of_outlines = outlines.points, outlines.normals, outlines.curvature, outlines.spacing
+    points, normals, *sizes = kernels.edge_points(frames, *of_outlines, _NO_LENGTH)
+    return OutlinePoints(points, normals, outlines.polarity, *sizes)
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,7 +81,6 @@ class EdgeFit:
     edges: Edges
     own: EdgeWeights
     light: LightSlope
-    model: _Model
     unknowns: np.ndarray  # (k, n)
     normal: np.ndarray  # (k, n, n)
     errors: np.ndarray  # (k, m), of edges, outwards, units of the print
@@ -122,75 +107,25 @@ def fit_edges(
     edges = measure_outlines(gray, edge_points(frames, outlines), blur, reach)
     own = weigh_edges(edges)
     light = kind.smooth(edges, own, outlines.polarity)
-    displacement = (edges.offset - edges.sensitivity * light.slope) / edges.scale
-    of_noise = _NOISE / np.maximum(edges.bright - edges.dark, _MINIMUM_STEP) / edges.scale
-    lit, in_px = kind.relative_to == 'light', kind.relative_to == 'px'
-    usual_noise = median(of_noise, own.seen)[:, None] if lit else 0.0
-    # Noise moves edges in shadow, light moves all of them.
-    deviation = np.hypot(of_noise, _UNEVEN_LIGHT / edges.scale) if lit else of_noise
-
-    def solve(weights: np.ndarray) -> tuple[tuple[np.ndarray, ...], np.ndarray]:
-        nonlocal deviation
-        unknowns, normal = model.solve(displacement, weights / deviation**2)
-        errors = displacement - model.displacement(unknowns)
-        if lit:
-            usual = spread(np.abs(errors), own.seen, 0.0)
-            deviation = np.hypot(of_noise, np.sqrt(np.maximum(usual**2 - usual_noise**2, 0)))
-        sizes = np.abs(errors)
-        return (unknowns, normal, errors), sizes * edges.scale if in_px else sizes / deviation
-
-    def scale(sizes: np.ndarray) -> np.ndarray:
-        return _OUTLIER * spread(sizes, own.seen, kind.minimum)
-
-    model = _Model(kind, outlines.polarity, edges.scale)
-    (unknowns, normal, errors), relative, robust = reweight(solve, own.weights, scale, kind.rounds)
-    weights, robust = (of / deviation**2 for of in (own.weights, robust))
-    return EdgeFit(edges, own, light, model, unknowns, normal, errors, relative, weights, robust)
-
-
-class _Model:
-    """How unknowns move the edges of k targets outwards; the last may be the growth of ink."""
-
-    def __init__(self, kind: EdgeKind, polarity: np.ndarray, scale: np.ndarray) -> None:
-        self._shared, self._prior = kind.basis, np.diag(kind.prior)
-        grown = len(kind.prior) - kind.basis.shape[1]
-        self._own = (polarity / scale)[..., None][..., :grown]
-        products = kind.basis[:, :, None] * kind.basis[:, None]
-        self._products = products.reshape(len(kind.basis), -1)
-
-    def normal(self, weights: np.ndarray) -> np.ndarray:
-        """Return the normal matrices of weighted least squares, shape (k, n, n)."""
-        count, known = len(weights), self._shared.shape[1]
-        weighted = (weights[..., None] * self._own).transpose(0, 2, 1)
-        mixed = weighted @ self._shared
-        normal = np.empty((count, *self._prior.shape))
-        normal[:, :known, :known] = (weights @ self._products).reshape(count, known, known)
-        normal[:, known:, :known] = mixed
-        normal[:, :known, known:] = mixed.transpose(0, 2, 1)
-        normal[:, known:, known:] = weighted @ self._own
-        return normal + self._prior
-
-    def solve(self, values: np.ndarray, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the unknowns, shape (k, n), and the normal matrices of weighted least squares."""
-        normal, weighted = self.normal(weights), weights * values
-        own = (weighted[..., None] * self._own).sum(axis=1)
-        right = np.concatenate([weighted @ self._shared, own], axis=1)
-        return np.linalg.solve(normal, right[..., None])[..., 0], normal
-
-    def displacement(self, unknowns: np.ndarray) -> np.ndarray:
-        """Return how far unknowns, shape (k, n), move the edges, shape (k, m)."""
-        known = self._shared.shape[1]
-        own = (self._own @ unknowns[:, known:, None])[..., 0]
-        return unknowns[:, :known] @ self._shared.T + own
-
-    def influence(self, normal: np.ndarray) -> np.ndarray:
-        """Return what weighted displacements do to the translation, shape (k, 2, m)."""
-        known = self._shared.shape[1]
-        inverse = np.linalg.inv(normal)[:, :2]
-        own = inverse[:, :, known:] @ self._own.transpose(0, 2, 1)
-        return inverse[:, :, :known] @ self._shared.T + own
-
-    def rows(self) -> np.ndarray:
-        """Return how far each unknown moves the edges, shape (k, m, n)."""
-        shared = np.broadcast_to(self._shared, (len(self._own), *self._shared.shape))
-        return np.concatenate([shared, self._own], axis=2)
+    found = kernels.outline_fits(
+        edges.offset,
+        edges.sensitivity,
+        light.slope,
+        edges.dark,
+        edges.bright,
+        edges.scale,
+        outlines.polarity,
+        own.seen,
+        own.weights,
+        kind.basis,
+        kind.prior,
+        _NOISE,
+        _UNEVEN_LIGHT if kind.relative_to == 'light' else 0.0,
+        _MINIMUM_STEP,
+        NORMAL,
+        _OUTLIER,
+        kind.minimum,
+        kind.relative_to == 'px',
+        kind.rounds,
+    )
+    return EdgeFit(edges, own, light, *found[:6])

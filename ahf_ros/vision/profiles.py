@@ -3,21 +3,21 @@
 Across each point of an outline a blurred step is fitted to the gray values. Besides the offset of
 the step, the fit gives its levels, the slope of the light beside it and what it leaves
 unexplained, which tell later how much weight the edge deserves. The fit is linear about each of a
-few offsets, so that it is done by filters that are made once for each blur and each width of
-profiles.
+few offsets, of which the one with the smallest residual is taken; so it is done by filters that
+are made once for each blur and each width of profiles.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache
-from itertools import pairwise
 from math import pi, sqrt
+from typing import NamedTuple
 
 import numpy as np
 
+from ahf_ros import kernels
 from ahf_ros.vision.normal import normal_integral
-from ahf_ros.vision.sampling import sample_lines, within
 
 USUAL_BLUR = 0.8
 """Standard deviation of a step, px: a sharp lens, the area of a pixel and the interpolation."""
@@ -32,7 +32,7 @@ _SAMPLES = 13  # of a profile
 _ALONG = np.linspace(-1, 1, _SAMPLES)  # where they are, half widths
 # The first one stands for no profile.
 _HALF_WIDTHS = np.array([0.0, 1.0, 1.3, 1.6, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0])  # px
-_BLUR_STEP = 0.1  # distance of two blurs that filters are made for, standard deviations in px
+_BLUR_STEP, _BLURS = 0.1, 41  # of blurs that filters are made for, px, and number of them, from 0
 _ENOUGH, _ENOUGH_BLURS = 3.0, 2.5  # half width of a profile, px, or deviations of the step
 _MAXIMUM_ASIDE = 0.8  # of the two lines of a profile, from its middle, px
 _MAXIMUM_OFFSET, _OFFSETS = 0.8, 17  # that is tried, half widths, and number of them
@@ -77,93 +77,40 @@ def measure_outlines(
     precision, and moves nothing. Steps are looked for within `reach` of an outline, in its units,
     a number or of shape (k, 1).
     """
-    aside = np.minimum(outlines.spacing / 4, _MAXIMUM_ASIDE)
-    enough = np.maximum(_ENOUGH, _ENOUGH_BLURS * blur)[:, None]
-    which = np.searchsorted(_HALF_WIDTHS, np.minimum(reach * outlines.scale, enough), 'right') - 1
-    which[outlines.polarity == 0] = 0
-    ends = _HALF_WIDTHS[which, None] * outlines.normals
-    for end in (outlines.points - ends, outlines.points + ends):
-        which[~within(end, gray.shape)] = 0
+    width, height = gray.shape[::-1]
+    reach = np.broadcast_to(np.ravel(reach), len(blur))
+    enough = np.maximum(_ENOUGH, _ENOUGH_BLURS * blur)
     blurs = np.rint(np.clip(blur, *BLURS) / _BLUR_STEP).astype(int)
-    groups = (which + len(_HALF_WIDTHS) * blurs[:, None]).ravel()
-    chosen = np.flatnonzero(which)
-    chosen = chosen[np.argsort(groups[chosen], kind='stable')]
-    points, normals = (of.reshape(-1, 2)[chosen] for of in (outlines.points, outlines.normals))
-    outwards = outlines.polarity.ravel()[chosen]
-    across = outwards[:, None] * normals  # from dark to bright
-    beside = aside.ravel()[chosen, None] * across[:, ::-1] * [-1, 1]
-    middles = np.concatenate([points - beside, points + beside])
-    directions = _HALF_WIDTHS[which.ravel()[chosen], None] * across
-    lines = sample_lines(gray, middles, np.concatenate([directions] * 2), _ALONG)
-    profiles = lines[: len(points)] + lines[len(points) :]
-    profiles /= 2
-    fitted = _fit_steps(profiles, groups[chosen])
-    fitted[[0, 3]] *= outwards
-    steps = np.zeros((len(fitted), which.size))
-    steps[:, chosen] = fitted
-    # On a curve, the blur and the chord between the two lines of a profile lie inside.
-    inside = (blur[:, None] ** 2 + aside**2) / 2 * outlines.curvature
-    steps[0] += np.where(which > 0, inside, 0.0).ravel()
-    measured = steps.reshape(len(steps), *which.shape)
-    return Edges(*[*measured, outlines.scale, outlines.spacing, which > 0])
+    at = outlines.points, outlines.normals, outlines.polarity
+    of_width = reach, enough, blurs, _HALF_WIDTHS
+    groups, used = kernels.profile_groups(
+        *at, outlines.scale, *of_width, width - 1.0, height - 1.0, b=_BLURS
+    )
+    used[:, 0] = False
+    chosen = np.flatnonzero(used)
+    filters = np.full(used.size, -1)
+    filters[chosen] = np.arange(len(chosen))
+    search, parts, known = _step_filters_of(chosen.tolist())
+    of_curve = outlines.spacing, outlines.curvature, blur
+    of_steps = np.tile(_HALF_WIDTHS, _BLURS), filters, _ALONG, search, parts, known
+    measured, visible = kernels.fit_steps(
+        gray, *at, *of_curve, groups, *of_steps, _MAXIMUM_ASIDE, _MINIMUM_STEP
+    )
+    return Edges(*[*measured, outlines.scale, outlines.spacing, visible])
 
 
-def _fit_steps(values: np.ndarray, groups: np.ndarray) -> np.ndarray:
-    """Fit blurred steps to n profiles, shape (n, samples), from dark to bright.
-
-    The fit is linear about each of the offsets tried; the one with the smallest residual is taken.
-    `groups`, shape (n,), ascend, see `_step_filters`. The result, shape (7, n), has the fields of
-    `Edges` up to the residual.
-    """
-    found = np.empty((len(values), 3 * _OFFSETS), np.float32)
-    for some, group in _runs(groups):
-        np.matmul(values[some], _step_filters(group).search, out=found[some])
-    kinds = groups * _OFFSETS + _best_offsets(found)
-    order = np.argsort(kinds, kind='stable')
-    ordered, kinds = values[order], kinds[order]
-    parameters = np.empty((len(values), 5 + _SAMPLES), np.float32)
-    known = np.empty((3, len(values)))
-    for some, kind in _runs(kinds):
-        filters, index = _step_filters(kind // _OFFSETS), kind % _OFFSETS
-        np.matmul(ordered[some], filters.parts[index], out=parameters[some])
-        known[:, some] = filters.known[:, index, None]
-    low, high, moved, light, blurred = parameters[:, :5].T.astype(np.float64)
-    rest = parameters[:, 5:]
-    residual = np.sqrt(np.einsum('ij,ij->i', rest, rest) / values.shape[1])
-    tried, spacing, sensitivity = known
-    contrast = np.maximum(high - low, _MINIMUM_STEP)
-    offset = tried + np.clip(-moved / contrast, -spacing, spacing)
-    slope, softness = light / np.maximum(high, _MINIMUM_STEP), -blurred / contrast
-    fitted = np.empty((7, len(values)))
-    fitted[:, order] = offset, low, high, slope, sensitivity, softness, residual
-    return fitted
-
-
-@dataclass(frozen=True, slots=True)
-class _StepFilters:
+class _StepFilters(NamedTuple):
     search: np.ndarray  # (samples, 3 p), two that explain a step at each offset, its contrast
     parts: np.ndarray  # (p, samples, 5 + samples), low, high, moved, slope, blur, residuals
     known: np.ndarray  # (3, p), offsets, their spacing, how a slope of the light moves steps, px^2
 
 
-def _runs(values: np.ndarray) -> list[tuple[slice, int]]:
-    """Return the runs of equal integers among ascending ones, shape (n,), and these integers."""
-    starts = np.flatnonzero(values[1:] != values[:-1]) + 1
-    bounds = [0, *starts.tolist(), len(values)] if len(values) else []
-    return [(slice(start, end), int(values[start])) for start, end in pairwise(bounds)]
-
-
-def _best_offsets(found: np.ndarray) -> np.ndarray:
-    """Return the indices of the offsets at which steps explain n profiles best.
-
-    What the filters of the search found has the shape (n, 3 p).
-    """
-    first, second, contrast = found.reshape(len(found), 3, _OFFSETS).swapaxes(0, 1)
-    first *= first
-    second *= second
-    first += second
-    np.copyto(first, -1.0, where=contrast <= 0)
-    return first.argmax(axis=1)
+def _step_filters_of(groups: list[int]) -> list[np.ndarray]:
+    """Return the filters of each group, one after the other."""
+    of_groups = [*map(_step_filters, groups)]
+    sides = (_SAMPLES, 3 * _OFFSETS), (_OFFSETS, _SAMPLES, 5 + _SAMPLES), (3, _OFFSETS)
+    parts = zip(*of_groups, strict=True) if groups else [()] * 3
+    return [np.array(of).reshape(-1, *shape) for of, shape in zip(parts, sides, strict=True)]
 
 
 @cache

@@ -11,12 +11,9 @@ References
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import TypeVar
-
 import numpy as np
 
-_Solution = TypeVar('_Solution')
+from ahf_ros import kernels
 
 NORMAL = 1.4826  # standard deviation of normal errors over the median of their sizes
 _RIDGE = 1e-3  # added to normal matrices, in weights, so that they can be inverted
@@ -27,10 +24,8 @@ def median(values: np.ndarray, selected: np.ndarray, empty: float = 1.0) -> np.n
 
     They are `empty` where nothing is selected.
     """
-    count = selected.sum(axis=1)
-    ordered = np.sort(np.where(selected, values, np.inf), axis=1)
-    middle = ordered[np.arange(len(count)), np.maximum(count - 1, 0) // 2]
-    return np.where(count > 0, middle, empty)
+    found: np.ndarray = kernels.selected_medians(values, selected, empty)[0]
+    return found
 
 
 def medians(values: np.ndarray) -> np.ndarray:
@@ -76,43 +71,14 @@ def geman_mcclure_gain(weights: np.ndarray, errors: np.ndarray) -> np.ndarray:
     return weights * (1 - 3 * squares) / (1 + squares) ** 3
 
 
-def reweight(
-    solve: Callable[[np.ndarray], tuple[_Solution, np.ndarray]],
-    weights: np.ndarray,
-    scale: Callable[[np.ndarray], np.ndarray | float],
-    rounds: int,
-) -> tuple[_Solution, np.ndarray, np.ndarray]:
-    """Solve least-squares problems by iterated reweighting after Geman and McClure.
-
-    Given weights, `solve` returns a solution and its residuals, of the shape of the weights. Given
-    residuals, `scale` returns the one at which a value keeps a quarter of its weight. Of at least
-    one round, the last solution is returned, with its residuals over their scale, and the weights
-    that they leave of those without outliers.
-    """
-    robust = weights
-    for _ in range(rounds):
-        solution, residuals = solve(robust)
-        errors = residuals / scale(residuals)
-        robust = geman_mcclure(weights, errors)
-    return solution, errors, robust
-
-
 def fit_linear(
     values: np.ndarray, weights: np.ndarray, basis: np.ndarray, scale: float, rounds: int = 4
 ) -> tuple[np.ndarray, np.ndarray]:
     """Fit linear models to k sets of values, shape (k, m), by iterated reweighting.
 
     With a basis of shape (m, n), the parameters have the shape (k, n), and their residuals (k, m).
-    A value with a residual of `scale` keeps a quarter of its weight.
+    A value with a residual of `scale` keeps a quarter of its weight, after Geman and McClure.
     """
-    products = (basis[:, :, None] * basis[:, None, :]).reshape(len(basis), -1)
-    size = basis.shape[1]
-
-    def solve(robust: np.ndarray) -> tuple[tuple[np.ndarray, np.ndarray], np.ndarray]:
-        normal = (robust @ products).reshape(-1, size, size) + _RIDGE * np.eye(size)
-        right = (robust * values) @ basis
-        parameters = np.linalg.solve(normal, right[..., None])[..., 0]
-        residuals = values - parameters @ basis.T
-        return (parameters, residuals), residuals
-
-    return reweight(solve, weights, lambda _: scale, rounds)[0]
+    prior = np.full(basis.shape[1], _RIDGE)
+    parameters, residuals, *_ = kernels.linear_fits(values, weights, basis, prior, scale, rounds)
+    return parameters, residuals

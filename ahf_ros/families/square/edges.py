@@ -21,7 +21,6 @@ from ahf_ros.families.square.frames import SQUARE, Places, side_lengths, square_
 from ahf_ros.vision.edge_errors import (
     EdgeWeights,
     LightSlope,
-    common_slope,
     grouped_covariance,
     smooth_slopes,
 )
@@ -114,11 +113,11 @@ def _polarity(prints: np.ndarray) -> np.ndarray:
 def _kind(cells: int) -> EdgeKind:
     """Return what moves the edges of markers: a frame, and the growth of ink."""
     grid, index = _grid(cells), np.arange(cells * len(_ALONG))
-    window = np.exp(-0.5 * ((index[:, None] - index) / _LIGHT_REACH) ** 2)
+    window = np.exp(-0.5 * ((index[:, None] - index) / _LIGHT_REACH) ** 2).astype(np.float32)
 
     def smooth(edges: Edges, own: EdgeWeights, polarity: np.ndarray) -> LightSlope:
-        slopes = edges.slope - polarity * common_slope(edges.slope, polarity, own.weights)
-        return smooth_slopes(slopes, own.weights, window, _LIGHT_PRIOR, rounds=1)
+        prior = np.full(len(polarity), _LIGHT_PRIOR)
+        return smooth_slopes(edges, polarity, own.weights, window, prior, np.inf, rounds=1)
 
     basis = outline_basis(grid.points, grid.normals)
     prior = np.full(basis.shape[1] + 1, WEAK_PRIOR)
@@ -130,14 +129,14 @@ def _fitted(
 ) -> Places:
     """Return markers fitted to their edges, or at first to those inside."""
     cells = prints.shape[1]
-    grid, expected = _grid(cells), _polarity(prints)
+    grid, kind, expected = _grid(cells), _kind(cells), _polarity(prints)
     frames, cell = square_frames(corners), side_lengths(corners).min(axis=1) / cells
     blur = np.full(len(corners), USUAL_BLUR)
     for number in range(_MEASUREMENTS):
         left_out = (grid.group == 0) & (inside_first and number < _INSIDE)
         outlines = replace(grid, polarity=np.where(left_out, 0, expected))
         used = np.clip(_WIDE_BLUR * cell, blur, BLURS[1]) if number < _WIDE else blur
-        fit = fit_edges(gray, frames, outlines, _kind(cells), used, _REACH / cells)
+        fit = fit_edges(gray, frames, outlines, kind, used, _REACH / cells)
         edges, own = fit.edges, fit.own
         if number:
             blur = np.clip(used + median(edges.softness, edges.visible, 0.0), *BLURS)
@@ -146,9 +145,12 @@ def _fitted(
     placed = own.seen & (np.abs(fit.errors * edges.scale) < _PLACED)
     count = np.maximum((outlines.polarity != 0).sum(axis=1), 1)
     share = np.where(own.seen.sum(axis=1) > _OF_SLOPE * count, placed.sum(axis=1) / count, 0.0)
-    scores = (fit.robust * fit.errors)[..., None] * fit.model.rows()
+    basis = np.broadcast_to(kind.basis, (*edges.scale.shape, kind.basis.shape[1]))
+    rows = np.concatenate([basis, (expected / edges.scale)[..., None]], axis=2)
+    scores = (fit.robust * fit.errors)[..., None] * rows
     of_cells = scores.reshape(len(corners), -1, len(_ALONG), scores.shape[2]).sum(axis=2)
-    normal = fit.model.normal(geman_mcclure_gain(fit.weights, fit.relative))
+    gained = geman_mcclure_gain(fit.weights, fit.relative)[..., None] * rows
+    normal = np.diag(kind.prior) + rows.swapaxes(1, 2) @ gained
     covariance = centre_covariance(frames, grouped_covariance(normal, of_cells.swapaxes(1, 2)))
     through = _THROUGH * (blur / cell) ** 4
     covariance += (through**2)[:, None, None] * np.eye(2)
