@@ -199,4 +199,16 @@ void edge_covariances(count k, count m, const double parts[k][2][m], const doubl
                       double correlation, double sharing, double no_weight,
                       double covariance[k][2][2]);
 
+/* votes.c */
+
+void count_votes(count n, count p, count s, count d, count tall, count wide, const double x[n],
+                 const double y[n], const float unit_x[n], const float unit_y[n],
+                 const float steps[p][s], const float cosines[d], const float sines[d],
+                 float squared_aspect, float flat, uint16_t votes[p][d][tall][wide]);
+void highest_cells(count n, const int64_t cells[n], const float values[n], int64_t wide,
+                   int64_t reach, bool highest[n]);
+void vote_peaks(count rows, count wide, count most, const uint16_t votes[rows][wide], float own,
+                float needed, float enough, float flat, int64_t reach, int64_t cells[most],
+                float sums[most], float shift[2][most], bool highest[most]);
+
 #endif

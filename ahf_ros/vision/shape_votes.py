@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from ahf_ros.vision import frame
-from ahf_ros.vision.candidates import cells_along, find_peaks
+from ahf_ros.vision.candidates import find_peaks, votes_along
 from ahf_ros.vision.dots import NO_DOTS, Dots
 from ahf_ros.vision.log_edges import LogEdges
 
@@ -53,16 +53,15 @@ def dots_in_shapes(edges: LogEdges, known: np.ndarray, polarity: int) -> Dots:
     near = frame.nearest(middles, known, NEIGHBOURS)
     shapes = np.median(frame.shapes(known)[near], axis=1)
     major, minor, angle = frame.axes_of(shapes)
-    towards_x, towards_y = _outwards(edges, shapes[edges.y // side * columns + edges.x // side])
+    towards = _outwards(edges, shapes[edges.y // side * columns + edges.x // side])
     # No vote lies farther outside than the largest dot reaches.
     margin = int(np.ceil(major.max())) + 2
     tall, wide = height + 2 * margin, width + 2 * margin
-    x, y = (at + np.float32(margin + _CENTRE) for at in (edges.x, edges.y))
-    step = np.array([-polarity], np.float32)
-    cells = cells_along(x, y, towards_x, towards_y, step, wide)
+    at = edges.x + (margin + _CENTRE), edges.y + (margin + _CENTRE)
+    votes = votes_along(at, towards, np.array([-polarity]), (tall, wide))
     outline = 2 * np.pi * np.sqrt((major**2 + minor**2) / 2)
     needed = _SHARE * outline.min()
-    peaks = find_peaks(cells, (1, tall, wide), needed, max(1, round(_REACH * minor.min())))
+    peaks = find_peaks(votes, needed, max(1, round(_REACH * minor.min())))
     x, y = peaks.x - margin, peaks.y - margin
     inside = (x > 0) & (y > 0) & (x < width - 1) & (y < height - 1)
     x, y, votes = x[inside], y[inside], needed * peaks.votes[inside]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from ahf_ros.vision import candidates
-from ahf_ros.vision.candidates import find_candidates, find_peaks, highest
+from ahf_ros.vision.candidates import find_candidates, find_peaks
 from ahf_ros.vision.pyramid import image_pyramid
 from support.drawn_dots import drawn, in_stripes
 
@@ -79,47 +79,32 @@ def test_many_bright_spots_do_not_crowd_out_dark_dots(monkeypatch: pytest.Monkey
 
 
 def votes_about(x: float, y: float, plane: int, count: int) -> np.ndarray:
-    """Return the cells that votes scattered about a point are for."""
+    """Return votes scattered about a point."""
     scatter = np.random.default_rng(3).normal(0, 0.7, (2, count))
     columns, rows = np.rint(np.array([[x], [y]]) + scatter).astype(int)
-    return (plane * SHAPE[1] + rows) * SHAPE[2] + columns
+    votes = np.zeros(SHAPE, np.uint16)
+    np.add.at(votes[plane], (rows, columns), 1)
+    return votes
 
 
 @pytest.mark.parametrize('plane', [0, 1])
 @pytest.mark.parametrize('x', [20.0, 20.3, 20.5, 20.8])
 def test_a_peak_lies_between_cells(plane: int, x: float) -> None:
-    peaks = find_peaks([votes_about(x, 15.4, plane, 400)], SHAPE, 100, 2)
+    peaks = find_peaks(votes_about(x, 15.4, plane, 400), 100, 2)
     assert peaks.plane.tolist() == [plane]
     assert (peaks.x[0], peaks.y[0]) == pytest.approx((x, 15.4), abs=0.15)
     assert peaks.votes[0] > 1
 
 
 def test_too_few_votes_make_no_peak() -> None:
-    assert len(find_peaks([votes_about(20, 15, 0, 60)], SHAPE, 100, 2).x) == 0
-    assert len(find_peaks([], SHAPE, 100, 2).x) == 0
+    assert len(find_peaks(votes_about(20, 15, 0, 60), 100, 2).x) == 0
+    assert len(find_peaks(np.zeros(SHAPE, np.uint16), 100, 2).x) == 0
 
 
 def test_peaks_of_two_planes_do_not_touch() -> None:
-    parts = [votes_about(20, 37, 0, 300), votes_about(20, 2, 1, 400)]
-    peaks = find_peaks(parts, SHAPE, 100, 2)
+    votes = votes_about(20, 36, 0, 300) + votes_about(20, 3, 1, 400)
+    peaks = find_peaks(votes, 100, 2)
     assert sorted(peaks.plane.tolist()) == [0, 1]
-
-
-def test_of_neighbours_the_highest_is_kept() -> None:
-    cells = np.array([10 * 60 + 10, 10 * 60 + 12, 10 * 60 + 15])
-    assert highest(cells, np.array([2.0, 3.0, 1.0]), (40, 60), 2).tolist() == [False, True, True]
-
-
-def test_cells_of_large_images_are_compared_in_bands(monkeypatch: pytest.MonkeyPatch) -> None:
-    generator = np.random.default_rng(1)
-    shape, reach = (400, 60), 3
-    inside = np.pad(np.ones((394, 54), bool), reach)
-    cells = generator.permutation(np.flatnonzero(inside))[:4000]
-    values = generator.integers(1, 9, len(cells)).astype(np.float32)
-    whole = highest(cells, values, shape, reach)
-    monkeypatch.setattr(candidates, '_FIELD', 40 * 60)
-    assert np.array_equal(highest(cells, values, shape, reach), whole)
-    assert 50 < whole.sum() < 2000
 
 
 def test_votes_of_large_images_are_counted_in_parts(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -30,7 +30,7 @@ from ahf_ros.families.pyramid_detector import PyramidDetector
 from ahf_ros.prints import CCTAG_NAMES
 from ahf_ros.prints.cctag import CctagPrint, circle_family
 from ahf_ros.vision import frame
-from ahf_ros.vision.candidates import cells_along, find_peaks
+from ahf_ros.vision.candidates import find_peaks, votes_along
 from ahf_ros.vision.dot_search import voted_dots, whole_dots
 from ahf_ros.vision.dots import Dots
 from ahf_ros.vision.ellipse_targets import ellipse_fields, frames_of, stayed, targets_from_frames
@@ -394,13 +394,13 @@ def _common_centres(octave: Octave) -> list[tuple[Dots, float]]:
     if len(edges.x) > most:
         weakest = np.partition(edges.strength, -most)[-most]
         edges = edges.select(edges.strength >= weakest)
-    steps = np.arange(1, _FACING, dtype=np.float32)
+    steps = np.arange(1, _FACING)
     steps = np.concatenate([-steps, steps])
     margin = int(high) + 2
     tall, wide = (side + 2 * margin for side in edges.marked.shape)
-    x, y = (of + (margin + 0.5) for of in (edges.x, edges.y))
-    votes = cells_along(x, y, edges.unit_x, edges.unit_y, steps, wide)
-    peaks = find_peaks(votes, (1, tall, wide), 2 * np.pi * low, int(low / 2))
+    at = edges.x + (margin + 0.5), edges.y + (margin + 0.5)
+    votes = votes_along(at, (edges.unit_x, edges.unit_y), steps, (tall, wide))
+    peaks = find_peaks(votes, 2 * np.pi * low, int(low / 2))
     x, y = (of - margin for of in (peaks.x, peaks.y))
     size = np.full(len(x), low)
     frames = frame.affine_frames(x, y, size, size, np.zeros(len(x)))
