@@ -222,6 +222,7 @@ static void mix(count w, count t, float weight, const float fine[2][w], float li
 
 /* A camera's gamma, and its unsharp mask. */
 static void take(count h, count w, count images, const struct camera *camera,
+                 float over[w],
                  float mixed[h][IMAGES][w], float scratch[h][IMAGES][w])
 {
     if (camera->gamma != 1)
@@ -239,20 +240,24 @@ static void take(count h, count w, count images, const struct camera *camera,
     float weights[MASK_TAPS + 1], more = (float)camera->sharpening;
     for (count t = 0; t <= MASK_TAPS; t++)
         weights[t] = (float)exponential(-0.5 * squared(t / camera->mask));
+    for (count j = 0; j < w; j++)
+        over[j] = 0;
+    for (count t = -MASK_TAPS; t <= MASK_TAPS; t++)
+        for (count j = MARGIN; j < w - MARGIN; j++)
+            if (j + t >= MARGIN && j + t < w - MARGIN)
+                over[j] += weights[t < 0 ? -t : t];
     for (count i = MARGIN; i < h - MARGIN; i++)
-        for (count j = MARGIN; j < w - MARGIN; j++) {
-            float sum = 0;
-            for (count p = 0; p < images; p++)
+        for (count p = 0; p < images; p++) {
+            for (count j = MARGIN; j < w - MARGIN; j++)
                 scratch[i][p][j] = 0;
-            for (count t = -MASK_TAPS; t <= MASK_TAPS; t++)
-                if (j + t >= MARGIN && j + t < w - MARGIN) {
-                    float weight = weights[t < 0 ? -t : t];
-                    sum += weight;
-                    for (count p = 0; p < images; p++)
-                        scratch[i][p][j] += weight * mixed[i][p][j + t];
-                }
-            for (count p = 0; p < images; p++)
-                scratch[i][p][j] /= sum;
+            for (count t = -MASK_TAPS; t <= MASK_TAPS; t++) {
+                count low = MARGIN - (t < 0 ? t : 0), high = w - MARGIN - (t > 0 ? t : 0);
+                float weight = weights[t < 0 ? -t : t];
+                for (count j = low; j < high; j++)
+                    scratch[i][p][j] += weight * mixed[i][p][j + t];
+            }
+            for (count j = MARGIN; j < w - MARGIN; j++)
+                scratch[i][p][j] /= over[j];
         }
     for (count i = MARGIN; i < h - MARGIN; i++) {
         float sum = 0;
@@ -331,7 +336,7 @@ static void form(count h, count w, count c, const double circles[c], const struc
         for (count i = 0; i < h; i++)
             for (count j = 0; j < w; j++)
                 mixed[i][OF_BLUR][j] *= (float)blur.change;
-    take(h, w, images, camera, mixed, scratch);
+    take(h, w, images, camera, of_w[0], mixed, scratch);
 }
 
 /* Gray values of known pixels, and their derivatives by all parameters.

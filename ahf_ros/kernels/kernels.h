@@ -211,4 +211,14 @@ void vote_peaks(count rows, count wide, count most, const uint16_t votes[rows][w
                 float needed, float enough, float flat, int64_t reach, int64_t cells[most],
                 float sums[most], float shift[2][most], bool highest[most]);
 
+/* cctag_rings.c */
+
+/* Ink of circles, whose radii are below 0 where paper fills them, along rays, and its changes by
+   the radius, by the shift, px, by ln of the blur, and by the sharpening by an unsharp mask. */
+void cctag_rings(count k, count c, count n, const double circles[k][c], const double size[k],
+                 const double shift[k], const double blur[k], const double sharpening[k],
+                 const float along[n], double mask, float ink[k][n], float by_radius[k][n],
+                 float by_shift[k][n], float by_blur[k][n], float by_sharpening[k][n],
+                 float row[2][n]);
+
 #endif

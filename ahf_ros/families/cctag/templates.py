@@ -7,9 +7,9 @@ from functools import lru_cache
 
 import numpy as np
 
+from ahf_ros import kernels
 from ahf_ros.families.cctag.rays import ALONG, PROFILE
 from ahf_ros.prints.cctag import CctagPrint
-from ahf_ros.vision.normal import normal_integral
 
 SIZE_STEP = 1.05
 """Ratio of radii that share templates."""
@@ -130,15 +130,10 @@ def two_discs(profiles: np.ndarray, step: int) -> np.ndarray:
 
 def _discs_along(signed: np.ndarray, size: float, edges: np.ndarray, every: int) -> np.ndarray:
     """Return the ink of single circles (c,) along the profile, for edges (e, 4), (e, c, n)."""
-    shift, blur, more = edges[:, :3].astype(np.float32).T[..., None, None]
-    signed = signed[:, None].astype(np.float32)
-    sign = np.sign(signed)
-    radii = np.abs(signed) * size + sign * shift
-    seen, masked = (
-        sign * normal_integral((radii - _places(of, size)[..., ::every] * size) / of)
-        for of in (blur, np.hypot(blur, np.float32(MASK)))
-    )
-    return (1 + more) * seen - more * masked
+    count, each = len(signed), np.repeat(edges[:, :3], len(signed), axis=0)
+    circles, sizes = np.tile(signed, len(edges))[:, None], np.full(len(each), size)
+    inks = kernels.cctag_rings(circles, sizes, *each.T, ALONG[::every], MASK)[0]
+    return np.asarray(inks).reshape(len(edges), count, -1)
 
 
 def _clipped(inks: np.ndarray, shares: np.ndarray) -> np.ndarray:
@@ -164,42 +159,12 @@ def rings_along(
     These are by the radius, in radii of the target, by the shift, px, by ln of the blur and by the
     sharpening.
     """
-    size, shift, blur, sharpening = (
-        of[:, None, None].astype(np.float32) for of in (size, shift, blur, sharpening)
-    )
-    signed = signed_circles(family, ids)[..., None].astype(np.float32)
-    sign = np.sign(signed)
-    radii = np.abs(signed) * size + sign * shift
-    seen = _blurred(radii, sign, size, blur)
-    wide = np.hypot(blur, np.float32(MASK))
-    masked = _blurred(radii, sign, size, wide)
-    masked[3] *= ((blur / wide) ** 2)[:, 0]
-    more = sharpening[:, 0]
-    return *((1 + more) * of - more * less for of, less in zip(seen, masked, strict=True)), (
-        seen[0] - masked[0]
-    )
+    circles = signed_circles(family, ids)
+    inks = kernels.cctag_rings(circles, size, shift, blur, sharpening, ALONG, MASK)
+    return tuple(inks[:5])
 
 
 def signed_circles(family: CctagPrint, ids: np.ndarray) -> np.ndarray:
     """Return the radii of the circles of IDs (k,), below 0 where paper fills them, (k, c)."""
     radii = family.radii(ids)
     return radii * (1 - 2 * (np.arange(radii.shape[1]) % 2))
-
-
-def _blurred(
-    radii: np.ndarray, sign: np.ndarray, size: np.ndarray, blur: np.ndarray
-) -> list[np.ndarray]:
-    """Return the ink of circles of radii (k, c, 1), px, and its derivatives, shape (k, n) each."""
-    away = (radii - _places(blur, size) * size) / blur
-    density = sign * np.exp(-0.5 * away**2) / math.sqrt(2 * math.pi)
-    return [
-        (sign * normal_integral(away)).sum(axis=1),
-        -(density * size / blur).sum(axis=1),
-        (sign * density / blur).sum(axis=1),
-        -(density * away).sum(axis=1),
-    ]
-
-
-def _places(blur: np.ndarray, size: np.ndarray | float) -> np.ndarray:
-    """Return where along the profile blur moves what lies near to the centre, outwards (Rice)."""
-    return np.sqrt(ALONG**2 + (blur / size) ** 2)
