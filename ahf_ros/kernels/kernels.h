@@ -221,4 +221,10 @@ void cctag_rings(count k, count c, count n, const double circles[k][c], const do
                  float by_shift[k][n], float by_blur[k][n], float by_sharpening[k][n],
                  float row[2][n]);
 
+/* ellipses.c */
+
+void strongest_steps(count k, count m, count n, const float values[k][m][n], const double scale[k],
+                     const double radii[k][n], double lowest, double highest, double flat,
+                     double displacement[k][m], double strongest[k][m], double steps[n]);
+
 #endif

@@ -8,6 +8,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from ahf_ros import kernels
 from ahf_ros.vision import frame
 from ahf_ros.vision.candidates import Candidates
 from ahf_ros.vision.dots import NO_DOTS, Dots
@@ -24,7 +25,7 @@ _MAXIMUM_RADIUS = 1.35  # the same, in the largest one
 _WIDTH = 1.5  # from the middle of an ellipse to where its weights end, bins
 _SHAPES = ((1.0, 1), (0.75, 4), (0.55, 6), (0.4, 8))  # aspect, number of directions
 _BESIDE, _SIDES = 0.4, 6  # distance of circles beside a candidate in their radius, directions
-_MINIMUM_COUNTED, _MAXIMUM_COUNTED = -0.3, 0.6  # steps of ln; one beyond counts no more
+_COUNTED = -0.3, 0.6  # steps of ln; one beyond counts no more
 _MINIMUM_SCORE = 0.15  # mean step of ln along the ellipse
 _SMALL = 8.0  # largest radius of a range of the first level that is fitted in the image, px
 _OVERSIZE = 1.6  # semi-major axis of a dot, in the largest radius of its range, at the most
@@ -87,7 +88,9 @@ def _best_ellipses(
     templates, radii, ellipses = _templates(low, high)
     one = np.ones(len(x))
     frames = frame.affine_frames(x, y, one, one, 0 * one)
-    steps = _steps(log, frames, _FEW_ANGLES, radii, polarity)
+    values = sample_circles(log, frames, _FEW_ANGLES, radii).astype(np.float32)
+    steps = (values[:, :, 2:] - values[:, :, :-2]) * (polarity / LOG_SCALE)[:, None, None]
+    steps = np.clip(steps, *_COUNTED, dtype=np.float32)
     scores = steps.reshape(len(x), len(templates)) @ templates
     best, highest = scores.argmax(axis=1), scores.max(axis=1)
     move_x, move_y, *axes = ellipses[best].T
@@ -128,25 +131,13 @@ def _templates(low: float, high: float) -> tuple[np.ndarray, np.ndarray, np.ndar
     return weights.reshape(len(weights), -1).T, radii, np.array(ellipses)
 
 
-def _steps(
-    log: np.ndarray,
-    frames: np.ndarray,
-    angles: np.ndarray,
-    radii: np.ndarray,
-    polarity: np.ndarray,
-) -> np.ndarray:
-    """Return the steps of ln outwards, from dark to bright, at all but the end radii."""
-    values = sample_circles(log, frames, angles, radii).astype(np.float32)
-    steps = (values[:, :, 2:] - values[:, :, :-2]) * (polarity / LOG_SCALE)[:, None, None]
-    return np.clip(steps, _MINIMUM_COUNTED, _MAXIMUM_COUNTED, dtype=np.float32)
-
-
 def _refined(log: np.ndarray, dots: Dots, window: float, angles: np.ndarray) -> Dots:
     """Return dots moved onto the strongest steps near their ellipses."""
     size = frame.mean_radii(dots.frames)[:, None]
     radii, windows = _profiles(size, window)
-    steps = _steps(log, dots.frames, angles, radii, dots.polarity)
-    displacement, step = _strongest(steps, radii)
+    values = sample_circles(log, dots.frames, angles, radii).astype(np.float32)
+    of_values = values, dots.polarity / LOG_SCALE, radii, *_COUNTED, _FLAT
+    displacement, step, _ = kernels.strongest_steps(*of_values)
     half = len(angles) // 2
     middle = np.partition(step, half, axis=1)[:, half, None]
     usual = np.maximum(middle, _MINIMUM_STEP)
@@ -170,9 +161,8 @@ def resized(log: np.ndarray, dots: Dots) -> Dots:
     radii, _ = _profiles(frame.mean_radii(dots.frames)[:, None], window)
     values = sample_circles(log, dots.frames, _ANGLES[::2], radii).astype(np.float32)
     values = np.exp((values - values.max(axis=2, keepdims=True)) / np.float32(LOG_SCALE))
-    outwards = dots.polarity.astype(np.float32)[:, None, None]
-    steps = outwards * (values[:, :, 2:] - values[:, :, :-2])
-    displacement, _ = _strongest(steps, radii)
+    of_values = values, dots.polarity.astype(float), radii, -1.0, 1.0, _FLAT
+    displacement, *_ = kernels.strongest_steps(*of_values)
     frames = dots.frames.copy()
     frames[:, :2, :2] *= 1 + medians(displacement)[:, None, None]
     return replace(dots, frames=frames)
@@ -182,16 +172,3 @@ def _profiles(size: np.ndarray, window: float) -> tuple[np.ndarray, np.ndarray]:
     """Return the radii of profiles across ellipses, and their windows."""
     windows = np.clip(_MINIMUM_WINDOW / size, window, _MAXIMUM_WINDOW)
     return 1 + np.linspace(-_PROFILE, _PROFILE, _SAMPLES) * windows, windows
-
-
-def _strongest(steps: np.ndarray, radii: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return how far the strongest steps of rays lie outside of ellipses, and these steps."""
-    best = np.clip(steps.argmax(axis=2), 1, steps.shape[2] - 2)
-    before, step, after = (
-        np.take_along_axis(steps, (best + shift)[..., None], axis=2)[..., 0].astype(np.float64)
-        for shift in (-1, 0, 1)
-    )
-    curvature = np.minimum(before - 2 * step + after, _FLAT)
-    shift = np.clip(0.5 * (before - after) / curvature, -1, 1)
-    spacing = radii[:, 1:2] - radii[:, :1]
-    return np.take_along_axis(radii, best + 1, axis=1) + shift * spacing - 1, step
