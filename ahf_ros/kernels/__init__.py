@@ -19,6 +19,7 @@ from __future__ import annotations
 import ctypes
 import os
 import re
+import sys
 from dataclasses import dataclass
 from functools import cache, cached_property
 from pathlib import Path
@@ -27,7 +28,10 @@ from typing import Any
 import numpy as np
 
 HEADER = Path(__file__).with_name('kernels.h')
-LIBRARY = HEADER.with_name('kernels.bin')
+# Its sources and what was compiled of them may be in two places.
+_PACKAGE = sys.modules[__name__.partition('.')[0]]
+_PLACES = [Path(folder, 'kernels', 'kernels.bin') for folder in _PACKAGE.__path__]
+LIBRARY = next((path for path in _PLACES if path.exists()), HEADER.with_name('kernels.bin'))
 VARIABLE = 'AHF_ROS_KERNELS'
 """Names another library, such as one with sanitizers."""
 
