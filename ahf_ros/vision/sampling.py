@@ -1,4 +1,4 @@
-"""Gray values of an image at points, on lines and on circles."""
+"""Gray values of an image at points and on circles."""
 
 from __future__ import annotations
 
@@ -22,26 +22,6 @@ def sample(image: np.ndarray, pixels: np.ndarray) -> np.ndarray:
         rows = slice(start, start + _REMAP_ROWS)
         values[rows] = remapped(image, maps[rows], None)
     return values.reshape(pixels.shape[:-1])
-
-
-def sample_lines(
-    image: np.ndarray, middles: np.ndarray, directions: np.ndarray, along: np.ndarray
-) -> np.ndarray:
-    """Return the values of an image on straight lines as `sample` does, shape (k, n).
-
-    The directions, px, shape (k, 2) as the middles, lead from these to the point at 1 along the
-    line; values are taken at places `along` it, shape (n,).
-    """
-    x, y = middles.T.astype(np.float32)[..., None]
-    across, down = directions.T.astype(np.float32)[..., None]
-    along = along.astype(np.float32)
-    values = np.empty((len(middles), len(along)), image.dtype)
-    for start in range(0, len(values), _REMAP_ROWS):
-        rows = slice(start, start + _REMAP_ROWS)
-        values[rows] = remapped(
-            image, x[rows] + across[rows] * along, y[rows] + down[rows] * along
-        )
-    return values
 
 
 def sample_circles(

@@ -1,10 +1,10 @@
-"""Gray values at points, on lines and on circles."""
+"""Gray values at points and on circles."""
 
 import numpy as np
 import pytest
 
 from ahf_ros.vision import frame
-from ahf_ros.vision.sampling import sample, sample_circles, sample_lines, within
+from ahf_ros.vision.sampling import sample, sample_circles, within
 
 OBLIQUE = np.array([[[20.0, 3.0, 100.5], [-2.0, 12.0, 80.25], [0.02, -0.01, 1.0]]])
 ANGLES = np.linspace(0, 2 * np.pi, 24, endpoint=False)
@@ -15,23 +15,11 @@ def test_samples_of_a_slope_are_those_of_the_slope() -> None:
     image = (2 * columns + 3 * rows).astype(np.float32)
     pixels = np.array([[3.25, 4.5], [10.0, 11.75]])
     assert sample(image, pixels) == pytest.approx([20.0, 55.25])
-    lines = sample_lines(
-        image, np.array([[10.0, 8.0]]), np.array([[0.6, 0.8]]), np.array([-1.0, 0.0, 2.0])
-    )
-    assert lines[0] == pytest.approx([44 - 3.6, 44, 44 + 7.2], abs=0.08)  # cv2.remap: 1/32 px
 
 
 def test_the_border_goes_on_beyond_the_image() -> None:
     image = np.arange(12, dtype=np.float32).reshape(3, 4)
     assert sample(image, np.array([[-5.0, 0.0], [9.0, 2.0]])).tolist() == [0.0, 11.0]
-
-
-def test_more_lines_than_one_remap_takes() -> None:
-    image = np.tile(np.arange(40, dtype=np.float32), (20, 1))
-    middles = np.stack([np.linspace(5, 35, 40000), np.full(40000, 10.0)], axis=1)
-    directions = np.tile([1.0, 0.0], (40000, 1))
-    values = sample_lines(image, middles, directions, np.array([0.0, 1.0]))
-    assert np.abs(values - middles[:, :1] - [0, 1]).max() < 0.02  # cv2.remap: 1/32 px
 
 
 def test_circles_are_sampled_where_they_are_projected() -> None:
