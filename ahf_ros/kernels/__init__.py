@@ -62,6 +62,11 @@ class Parameter:
     sides: tuple[str, ...]  # of an array; names of counts, or numbers
 
     @cached_property
+    def dimensions(self) -> int:
+        """How many sides an array has."""
+        return len(self.sides)
+
+    @cached_property
     def dtype(self) -> np.dtype[Any]:
         """What numpy calls the type."""
         return NUMBERS[self.kind][0]
@@ -147,10 +152,9 @@ class Kernel:
                     and value.flags.c_contiguous
                 ):
                     value = _as_declared(value, each, self.name)
-                shape = value.shape
-                if len(shape) != len(each.sides):
+                if value.ndim != each.dimensions:
                     raise self._refusal(each, value, {})
-                for side, size in zip(each.sides, shape, strict=True):
+                for side, size in zip(each.sides, value.shape, strict=True):
                     if side not in sizes:
                         sizes[side] = size
                     elif sizes[side] != size:
@@ -185,13 +189,13 @@ class Kernel:
 
 def _as_declared(value: Any, each: Parameter, kernel: str) -> np.ndarray:
     """Return an argument as an array in C order of the declared type."""
-    array = np.asarray(value)
-    if not np.can_cast(array.dtype, each.dtype, 'same_kind'):
+    array = value if isinstance(value, np.ndarray) else np.asarray(value)
+    if array.dtype != each.dtype and not np.can_cast(array.dtype, each.dtype, 'same_kind'):
         raise TypeError(
             f'{each.name} of the kernel {kernel} has the type {array.dtype}, accepted is '
             f'{each.dtype}'
         )
-    return np.ascontiguousarray(array, each.dtype).reshape(array.shape)
+    return array.astype(each.dtype, order='C')
 
 
 def declared(header: str) -> dict[str, Kernel]:
