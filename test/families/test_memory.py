@@ -30,7 +30,6 @@ def test_a_pixel_takes_so_many_bytes(
 ) -> None:
     # Parts as small beside this image as they are beside one of 100 MP.
     for module, name in (
-        (candidates, '_FIELD'),
         (candidates, '_MOST_CELLS'),
         (log_edges, '_BAND'),
         (small_dots, '_STRIP'),

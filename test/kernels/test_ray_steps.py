@@ -18,8 +18,8 @@ def test_the_strongest_step_of_each_ray_is_found_between_samples(seed: int) -> N
         if n < 5:
             assert displacement[i, j] == strongest[i, j] == 0
             continue
-        steps = ((values[i, j, 2:] - values[i, j, :-2]) * scale[i]).astype(np.float32)
-        steps = np.clip(steps, -0.3, 0.6)
+        steps = (values[i, j, 2:] - values[i, j, :-2]).astype(float) * scale[i]
+        steps = np.clip(steps.astype(np.float32), -0.3, 0.6)
         best = min(max(int(steps.argmax()), 1), n - 4)
         before, step, after = steps[best - 1 : best + 2].astype(float)
         shift = 0.5 * (before - after) / min(before - 2 * step + after, -1e-3)
