@@ -8,8 +8,6 @@
 
 static const float NEVER_SEEN = 1e9f; /* more than any gray value, or radius */
 
-static inline count row_within(int64_t i, count n) { return i < 0 ? 0 : i < n ? (count)i : n - 1; }
-
 /* Gray values at r radii, of all m angles or of each, between the two circles beside them: of k
    targets, each in one of i images of c circles from `innermost` to `outermost`. */
 void gray_at(count k, count i, count c, count m, count r, count g, const float gray[i][c][m],
@@ -18,7 +16,7 @@ void gray_at(count k, count i, count c, count m, count r, count g, const float g
 {
     for (count b = 0; b < k; b++) {
         double spacing = (outermost[b] - innermost) / (double)(c - 1);
-        const float(*image)[m] = gray[row_within(row[b], i)];
+        const float(*image)[m] = gray[within(row[b], i)];
         for (count j = 0; j < r; j++) {
             const float *below = image[0], *above = image[0];
             float share = 0;
@@ -268,7 +266,7 @@ void ground_votes(count k, count i, count c, count m, count s, const float gray[
                   int64_t outermost[k], int32_t sums[c][m])
 {
     for (count b = 0; b < k; b++) {
-        const float(*image)[m] = gray[row_within(row[b], i)];
+        const float(*image)[m] = gray[within(row[b], i)];
         for (count j = 0; j < c; j++) { /* from the outermost circle inwards */
             count circle = c - 1 - j;
             int32_t counts = radii[b][circle] >= least[b];
@@ -285,7 +283,7 @@ void ground_votes(count k, count i, count c, count m, count s, const float gray[
             int64_t sum = 0;
             for (count a = 0; a < m && outermost[b] > 0; a++)
                 if (beyond[shape][a] > 0)
-                    sum += sums[row_within(beyond[shape][a] - 1, c)][a];
+                    sum += sums[within(beyond[shape][a] - 1, c)][a];
             votes[b][shape] = sum;
         }
     }

@@ -5,8 +5,6 @@
 #include "elementary.h"
 #include "kernels.h"
 
-static inline count within(int64_t i, count n) { return i < 0 ? 0 : i < n ? (count)i : n - 1; }
-
 static inline count around(int64_t i, count n) { return (count)((i % n + n) % n); }
 
 static const float NEVER = -1e30f;

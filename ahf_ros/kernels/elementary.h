@@ -131,6 +131,7 @@ static inline float logarithm_f(float x)
     return n * 0.693145751953125f + (2.0f * s + (s * z * sum + n * 1.42860682030941723212e-6f));
 }
 
+/* Density of a normal distribution of a deviation at a distance from its middle. */
 static inline float normal_density_f(float distance, float deviation)
 {
     float share = distance / deviation;
@@ -163,13 +164,6 @@ static inline double hyperbolic_tangent(double x)
 {
     double grown = exponential(2.0 * greater(lesser(x, 20.0), -20.0));
     return (grown - 1.0) / (grown + 1.0);
-}
-
-/* Density of a normal distribution of a deviation at a distance from its middle. */
-static inline double normal_density(double distance, double deviation)
-{
-    double share = distance / deviation;
-    return exponential(-0.5 * share * share) * (0.39894228040143267794 / deviation);
 }
 
 /* Share of a normal distribution below x deviations, to 1e-7: 7.1.26 of Abramowitz & Stegun,

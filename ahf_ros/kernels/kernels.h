@@ -14,6 +14,9 @@
 
 typedef ptrdiff_t count;
 
+/* The nearest index of an array of n. */
+static inline count within(int64_t i, count n) { return i < 0 ? 0 : i < n ? (count)i : n - 1; }
+
 /* elementary.c */
 
 void exponentials(count n, const double x[n], double y[n]);

@@ -50,7 +50,7 @@ void profile_groups(count k, count m, count w, count b, const double points[k][m
         for (count width = 0; width < w; width++)
             used[blur][width] = false;
     for (count i = 0; i < k; i++) {
-        count blur = blurs[i] < 0 ? 0 : blurs[i] < b ? blurs[i] : b - 1;
+        count blur = within(blurs[i], b);
         for (count j = 0; j < m; j++) {
             double length = reach[i] * scale[i][j];
             length = length < enough[i] ? length : enough[i];
@@ -116,7 +116,7 @@ void fit_steps(count h, count w, count k, count m, count g, count f, const float
 {
     for (count i = 0; i < k; i++)
         for (count j = 0; j < m; j++) {
-            count group = groups[i][j] < 0 ? 0 : groups[i][j] < g ? groups[i][j] : g - 1;
+            count group = within(groups[i][j], g);
             double half = half_widths[group];
             count filter = filters[group];
             visible[i][j] = half > 0 && filter >= 0 && filter < f;

@@ -218,6 +218,11 @@ class _Bands:
         """The step of all ink."""
         return self.some.looks.shape[1] - 1
 
+    @property
+    def cost(self) -> np.ndarray:
+        """The price of each reading that something covers, (k,)."""
+        return np.float32(_COVERED) * self.some.weight
+
     def steps(self, words: np.ndarray, phases: np.ndarray) -> np.ndarray:
         """Return the shares of ink that words (k, w) show, in steps of `looks`, (k, w, m)."""
         sizes = {'n': self.family.bits, 'm': self.some.paper.shape[1]}
@@ -239,8 +244,8 @@ class _Bands:
 
         With it comes the number of their borders, each of which has its price, shape (k,).
         """
-        cost = np.float32(_COVERED) * self.some.weight
-        scores, borders = kernels.free_arcs(self.some.looks, self.first, border, COVER, cost)
+        some = self.some
+        scores, borders = kernels.free_arcs(some.looks, self.first, border, COVER, self.cost)
         return scores.astype(np.float64), borders
 
     def under_long_covers(
@@ -260,8 +265,7 @@ class _Bands:
         if long:
             longer = np.float32(1 - _COVERED / _MORE) * self.more[:, None]
             on_paper, on_mark = on_paper + longer, on_mark + longer
-        cost = np.float32(_COVERED) * some.weight
-        return some.looks, steps, self.first, on_paper, on_mark, COVER, cost, self.price
+        return some.looks, steps, self.first, on_paper, on_mark, COVER, self.cost, self.price
 
     def _moved(self, steps: np.ndarray) -> np.ndarray:
         """Return the steps of words whose bands are where they fit best beside their dots, (k, m).
@@ -270,7 +274,8 @@ class _Bands:
         """
         here, before = _moves(steps.shape[1])
         best = kernels.best_moves(self.some.looks, steps, here, before)
-        return (steps[:, here] + steps[:, before])[np.arange(len(steps)), best] // 2
+        rows = np.arange(len(steps))[:, None]
+        return (steps[rows, here[best]] + steps[rows, before[best]]) // 2
 
 
 def _as_it_looks(

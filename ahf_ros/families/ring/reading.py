@@ -140,7 +140,8 @@ def best_growth(
 
     In the dot radii of the image; a dot that is seen with radius 1 was printed with less.
     """
-    gray, reach, plate = polar.gray[:, ::2], polar.reach[:, ::2], polar.plate[:, ::2]
+    reach, plate = polar.reach[:, ::2], polar.plate[:, ::2]
+    gray = np.ascontiguousarray(polar.gray[:, ::2].swapaxes(1, 2)).swapaxes(1, 2)
     half = replace(polar, gray=gray, reach=reach, plate=plate)
     every = half.repeated(len(_SHIFTS))
     tried = growth_by(np.repeat(_SHIFTS, len(polar.size)), every.size)
