@@ -13,11 +13,12 @@ import sys
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import closing, suppress
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 from zlib import crc32
 
+import numpy as np
 from rosbags.interfaces import Connection, ConnectionExtRosbag2, MessageDefinitionFormat
 from rosbags.rosbag2 import StoragePlugin, Writer
 
@@ -27,7 +28,8 @@ from ahf_ros.bag.source import METADATA, Source, read_metadata
 from ahf_ros.base.opening import check_regular, parsing
 from ahf_ros.base.parsed_yaml import parsed_yaml
 from ahf_ros.base.writing import place, write_whole
-from ahf_ros.identification.filtering.identifier import Memory
+from ahf_ros.files.target_json import targets_from_json
+from ahf_ros.identification.filtering.identifier import Memory, Seen
 
 JOURNAL = 'unfinished.sqlite'
 
@@ -40,6 +42,7 @@ _TABLES = (
     'task (origin TEXT)',
     'images (number INTEGER PRIMARY KEY, entry TEXT, outputs INTEGER, checksum INTEGER)',
     'outputs (image INTEGER, number INTEGER, topic TEXT, data BLOB, PRIMARY KEY (image, number))',
+    'seen (topic TEXT PRIMARY KEY, height INTEGER, image BLOB, known TEXT, checksum INTEGER)',
 )
 # Under which a bag keeps what it was made from, and what became of it.
 _ORIGIN_KEY, _OUTCOME_KEY = 'ahf_ros', 'ahf_ros_outcome'
@@ -73,7 +76,7 @@ class Entry:
 
     topic: str  # of the image
     timestamp: int  # of recording, ns
-    memory: Memory  # what the image leaves to the next one of the topic
+    memory: Memory  # what the image leaves to the next one of the topic; see `Journal.seen`
     reason: str = ''  # why the image was refused; empty if it was not
     note: str = ''  # what else there is to say, such as what became of its stack
     damaged: bool = False  # whether the image is not whole
@@ -112,8 +115,14 @@ class Journal:
 
     def append(self, entry: Entry, outputs: Sequence[Output]) -> None:
         """Write the entry of an image and the messages about it, all or nothing."""
+        memory, seen = replace(entry.memory, seen=None), entry.memory.seen
+        entry = replace(entry, memory=memory)
         image, text = len(self.entries), json.dumps(asdict(entry))
         with self._database:
+            self._database.execute('DELETE FROM seen WHERE topic = ?', (entry.topic,))
+            if seen:
+                insert = 'INSERT INTO seen VALUES (?, ?, ?, ?, ?)'
+                self._database.execute(insert, (entry.topic, *_stored(seen)))
             row = image, text, len(outputs), _checksum(text, outputs)
             self._database.execute('INSERT INTO images VALUES (?, ?, ?, ?)', row)
             self._database.executemany(
@@ -121,6 +130,12 @@ class Journal:
                 ((image, number, *output) for number, output in enumerate(outputs)),
             )
         self.entries.append(entry)
+
+    def seen(self, topic: str) -> Seen | None:
+        """Return what the last image of a topic has left to be followed."""
+        query = 'SELECT height, image, known, checksum FROM seen WHERE topic = ?'
+        stored = self._database.execute(query, (topic,)).fetchone()
+        return _restored(*stored) if stored else None
 
     def outputs(self) -> Iterator[tuple[Entry, list[Output]]]:
         """Yield every entry with the messages about its image, in order."""
@@ -144,6 +159,29 @@ def _entry(text: str) -> Entry:
         for name, value in fields['memory'].items()
     }
     return Entry(**fields | {'memory': Memory(**memory)})
+
+
+def _stored(seen: Seen) -> tuple[int, bytes, str, int]:
+    """Return what was seen as the columns of a row: height, image, targets and a checksum."""
+    known = {
+        'targets': [asdict(it) for it in seen.targets],
+        'lost': [asdict(it) for it in seen.lost],
+        'turn': seen.turn,
+    }
+    image, text = seen.image.tobytes(), json.dumps(known)
+    return len(seen.image), image, text, crc32(text.encode(), crc32(image))
+
+
+def _restored(height: int, image: bytes, text: str, checksum: int) -> Seen:
+    """Return what was seen from the columns of a row."""
+    if checksum != crc32(text.encode(), crc32(image)):
+        raise ValueError('what was seen last is damaged, accepted is to remove the file')
+    known = json.loads(text)
+    targets, lost = (
+        tuple(targets_from_json({'targets': known[name]}, name)) for name in ('targets', 'lost')
+    )
+    pixels = np.frombuffer(image, np.uint8).reshape(height, -1)
+    return Seen(pixels, targets, lost, known['turn'])
 
 
 def begin(output: Path, origin: str) -> None:

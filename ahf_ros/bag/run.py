@@ -10,7 +10,7 @@ import re
 import sqlite3
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import closing, suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -64,7 +64,7 @@ Report = Callable[[int, int, str], None]
 """Called after each image with the number of finished images, the number of all images or 0 if
 unknown, and what there is to say about this image or its stack, empty if there is nothing."""
 
-_FORMAT = 6  # version of the journal and of the data stored in a bag
+_FORMAT = 7  # version of the journal and of the data stored in a bag
 _TOPIC_NAME = re.compile(r'/?[A-Za-z_]\w*(/[A-Za-z_]\w*)*', re.ASCII)
 _ADDRESS = re.compile('[?#%]')  # rosbags opens SQLite files by an address
 
@@ -212,12 +212,17 @@ def _answer_images(
     if not source.checked:
         report(0, total, 'chunks have no checksums, so that damage in them may not be noticed')
     earlier = list(journal.entries)
+    last_of = {entry.topic: number for number, entry in enumerate(earlier)}
     settled: dict[str, tuple[str, ...]] = {}  # families by topic
     for number, (message, last) in enumerate(_with_last(source.messages(topics))):
         if number < len(earlier):
             entry = earlier[number]
             connection, timestamp, _ = message
             check_entry(source, task.output, entry, connection.topic, timestamp)
+            if number == last_of[entry.topic]:
+                with parsing(task.output / JOURNAL, 'what this version has begun'):
+                    seen = journal.seen(entry.topic)
+                entry = replace(entry, memory=replace(entry.memory, seen=seen))
             answering.resume(entry, message)
         else:
             entry, outputs = answering.answer(message, last)

@@ -21,6 +21,7 @@ class IdentificationOptions(DetectorOptions, total=False):
 
     expected_targets: int
     estimate_expected: bool
+    follow: int
     ahf: bool
     expected_ids: str
     network_ids: str

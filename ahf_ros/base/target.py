@@ -45,6 +45,8 @@ class Target:
         gray values is taken out. None where it was not measured.
     polarity : int
         1 for a dark dot on bright ground, -1 for a bright one on dark, 0 where it is unknown.
+    followed : bool
+        Whether it was read again where the image before showed it, without a search.
 
     Examples
     --------
@@ -65,6 +67,7 @@ class Target:
     # By name only, so that the fields of the classes below follow `family` in their order.
     edge_shift: float | None = field(default=None, kw_only=True)
     polarity: int = field(default=0, kw_only=True)
+    followed: bool = field(default=False, kw_only=True)
 
     @property
     def key(self) -> tuple[str, int]:

@@ -53,8 +53,9 @@ def checked_target(target: Any, name: str) -> Target:
     Accepted are an `id` from -1 to 2^31 - 1, a `code` from 0 to 2^32 - 1, finite coordinates and
     semi-axes, an `angle` within a turn, a `confidence` from 0 to 1, a covariance that is symmetric
     and positive semidefinite, a `family` that is a printable text, an `edge_shift` that is None or
-    a number of px, and a `polarity` of -1, 0 or 1; numpy scalars and arrays are converted. A
-    ValueError names the target as `name` does, the field, its value and what is accepted.
+    a number of px, a `polarity` of -1, 0 or 1, and `followed`, true or false; numpy scalars and
+    arrays are converted. A ValueError names the target as `name` does, the field, its value and
+    what is accepted.
     """
     if not isinstance(target, Target):
         raise ValueError(f'{name} is {shown(target)}, accepted is a Target')
@@ -104,6 +105,12 @@ def checked_number(value: Any, name: str, minimum: float, maximum: float) -> flo
             f'{name} is {shown(value)}, accepted is a number from {minimum:g} to {maximum:g}'
         )
     return number
+
+
+def _flag(value: Any, name: str) -> bool:
+    if isinstance(value, (bool, np.bool_)):
+        return value if type(value) is bool else bool(value)
+    raise ValueError(f'{name} is {shown(value)}, accepted is True or False')
 
 
 def _integer(value: Any) -> int | None:
@@ -176,4 +183,5 @@ _CHECKS: dict[str, Callable[[Any, str], Any]] = {
     'family': checked_text,
     'edge_shift': lambda value, name: None if value is None else _PLACE(value, name),
     'polarity': partial(checked_integer, minimum=-1, maximum=1),
+    'followed': _flag,
 }

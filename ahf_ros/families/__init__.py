@@ -18,6 +18,7 @@ from ahf_ros.base.settings.nested import updated
 from ahf_ros.base.settings.parameter import Parameter
 from ahf_ros.base.text import printable, reason_of, shown
 from ahf_ros.families.contract import (
+    Confirming,
     Contesting,
     Detector,
     DetectorSettings,
@@ -41,6 +42,7 @@ __all__ = [
     'DETECTOR_NAMES',
     'FAMILY_NAMES',
     'GROUP',
+    'Confirming',
     'Contesting',
     'Detector',
     'DetectorSettings',

@@ -37,8 +37,8 @@ class Detector(Protocol):
 
     A detector keeps nothing between calls, may be called from several threads at once and returns
     the same targets for the same image. The image is its only input, so a filtered image is as
-    good as one taken by a camera. A detector may also be a `Refiner`, and a `Drafter` with it, and
-    `Expecting`.
+    good as one taken by a camera. A detector may also be a `Refiner`, and a `Drafter` with it,
+    `Confirming` and `Expecting`.
 
     Examples
     --------
@@ -109,6 +109,27 @@ class Drafter(Protocol):
 
     def draft(self, image: np.ndarray) -> list[Target]:
         """Identify the targets of one image, as a call does but with rough centres."""
+        ...
+
+
+@runtime_checkable
+class Confirming(Protocol):
+    """A detector that reads targets again in the next image, without a search for them."""
+
+    def confirm(self, image: np.ndarray, targets: Sequence[Target]) -> list[Target]:
+        """Return what an image shows in the places of targets, as a call would report it.
+
+        Parameters
+        ----------
+        image : ndarray of uint8, uint16, float32 or float64, shape (height, width)
+        targets : sequence of Target
+            With centres to about two pixels, and the shapes that they have in this image.
+
+        Returns
+        -------
+        list of Target
+            Sorted by ID. What shows no target any more, or a doubtful one, is missing.
+        """
         ...
 
 

@@ -122,7 +122,8 @@ def _values(target: Target) -> dict[str, Any]:
 
 def _target(message: Any) -> Target:
     """Return the target of a message, a `SquareMarker` where it has corners."""
-    values = {name: getattr(message, name) for name in _TARGET_FIELDS}
+    sent = (name for name in _TARGET_FIELDS if hasattr(message, name))  # bags may be older
+    values = {name: getattr(message, name) for name in sent}
     values['covariance'] = tuple(message.covariance.tolist())
     if not has_corners(message):
         return Target(**values)

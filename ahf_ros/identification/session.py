@@ -14,6 +14,7 @@ from ahf_ros.base.settings.nested import updated
 from ahf_ros.base.target import Identification
 from ahf_ros.base.text import shown
 from ahf_ros.families import (
+    Confirming,
     Contesting,
     Detector,
     Drafter,
@@ -27,6 +28,7 @@ from ahf_ros.families import (
 )
 from ahf_ros.identification.filtering.identifier import Identifier
 from ahf_ros.identification.filtering.trials import DetectorFunction
+from ahf_ros.identification.following import Following
 from ahf_ros.identification.session_settings import IdentificationSettings
 from ahf_ros.identification.settling import SettlingIdentifier
 from ahf_ros.prints.families import AUTO
@@ -143,6 +145,7 @@ def _identifier(
         refine=used.refine if isinstance(used, Refiner) else None,
         draft=used.draft if isinstance(used, Drafter) else None,
         estimate=estimator(settings.detection) if settings.estimate_expected else None,
+        follow=_following(used, settings) if kind is Identifier else None,
         interrupt=interrupt,
         contested=settings.detection.report_undecoded,
         patience=used.patience if isinstance(used, EarlyStopping) else 0,
@@ -152,6 +155,15 @@ def _identifier(
         prints=prints,
         **more,
     )
+
+
+def _following(used: Any, settings: IdentificationSettings) -> Following | None:
+    """Return what follows the targets of a detector, None if every image is searched wholly."""
+    every = settings.detection.report_undecoded
+    if not settings.follow or every or not isinstance(used, Confirming):
+        return None
+    prints = settings.detection.prints
+    return Following(used, used.confirm, prints, settings.follow)  # type: ignore[arg-type]
 
 
 @deprecated_arguments(positions=('detector', 'settings'))

@@ -31,6 +31,9 @@ class IdentificationSettings:
         N, the number of coded targets in every image; 0 where unknown.
     estimate_expected : bool
         Whether to estimate N where it is unknown.
+    follow : int
+        Images in which all of an image is searched again that has not changed; 0: every image is
+        searched wholly.
     detection : DetectorSettings
         What the targets look like.
     adaptive : AdaptiveSettings
@@ -60,6 +63,14 @@ class IdentificationSettings:
         False,
         'Whether to estimate N where it is unknown, and to search for a filter that shows N '
         'targets.',
+    )
+    follow: int = parameter(
+        30,
+        'Images after which all that has not changed has been searched again, in parts: known '
+        'targets are read again in the next image, and what changed is searched; 0: every image '
+        'is searched wholly.',
+        minimum=0,
+        maximum=10_000,
     )
     detection: DetectorSettings = field(default_factory=DetectorSettings)
     adaptive: AdaptiveSettings = field(default_factory=AdaptiveSettings)

@@ -271,7 +271,9 @@ class SettlingIdentifier(Identifier):
     ) -> Identification:
         """Return what an image shows of some families, and remember it."""
         reader = self._reader(families)
-        reader.memory = self.memory
+        # What was seen of other families does not tell where these are.
+        same = families == self.memory.families
+        reader.memory = self.memory if same else replace(self.memory, seen=None)
         trials = reader._trials(stack)
         for values, seen in self._read_already(families):
             trials.know(values, seen)

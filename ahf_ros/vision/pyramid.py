@@ -77,13 +77,18 @@ def image_pyramid(gray: np.ndarray, max_radius: float, contrast: int = 1) -> Ima
     the image, nor does a narrow image show one flatter than `MINIMUM_ASPECT`. Edges are those of
     so many times the contrast.
     """
+    bare = bare_pyramid(gray, max_radius)
+    logs = tuple(log_image(level, contrast) for level in bare.images)
+    edges = tuple(find_edges(log) for log in logs[1:])
+    return replace(bare, logs=logs, edges=edges, contrast=contrast)
+
+
+def bare_pyramid(gray: np.ndarray, max_radius: float) -> ImagePyramid:
+    """Return the same without logarithms and edges, to measure dots in that are known."""
     narrow, wide = sorted(gray.shape)
     largest = min(max_radius, wide / 2, narrow / 2 / MINIMUM_ASPECT)
-    levels = max(1, ceil(log2(largest / MAXIMUM_RADIUS)))
-    images = halved(gray, levels)
-    logs = tuple(log_image(level, contrast) for level in images)
-    edges = tuple(find_edges(log) for log in logs[1:])
-    return ImagePyramid(images[0], tuple(images[1:]), logs, edges, contrast)
+    image, *halves = halved(gray, max(1, ceil(log2(largest / MAXIMUM_RADIUS))))
+    return ImagePyramid(image, tuple(halves), (), ())
 
 
 def octaves(pyramid: ImagePyramid, min_radius: float, max_radius: float) -> Iterator[Octave]:
@@ -94,7 +99,7 @@ def octaves(pyramid: ImagePyramid, min_radius: float, max_radius: float) -> Iter
     bounds of the radius are px of the image.
     """
     largest = MAXIMUM_RADIUS * 2**_OCTAVE_LEVELS
-    for level in range(max(1, len(pyramid.edges) - _OCTAVE_LEVELS + 1)):
+    for level in range(max(1, len(pyramid.halves) - _OCTAVE_LEVELS + 1)):
         smallest = largest / 2 * _ABOVE if level else 0.0
         low = max(min_radius / 2**level, smallest)
         high = min(max_radius / 2**level, largest * _SLACK)

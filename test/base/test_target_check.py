@@ -103,6 +103,7 @@ def test_numbers_of_numpy_are_converted() -> None:
         np.str_('aicon12'),
         edge_shift=np.float32(-0.5),
         polarity=np.int8(-1),
+        followed=np.bool_(True),
     )
     checked = checked_target(target, 'x')
     covariance = (1.0, 0.0, 0.0, 2.0)
@@ -110,9 +111,11 @@ def test_numbers_of_numpy_are_converted() -> None:
         *(7, 9, 10.5, 20.0, 4.0, 3.0, 0.5, 1.0, covariance, 'aicon12'),
         edge_shift=-0.5,
         polarity=-1,
+        followed=True,
     )
     types = [type(getattr(checked, name)) for name in NAMES]
-    assert types == [int, int, float, float, float, float, float, float, tuple, str, float, int]
+    of_numbers = [int, int, float, float, float, float, float, float]
+    assert types == [*of_numbers, tuple, str, float, int, bool]
     assert all(type(it) is float for it in checked.covariance)
 
 

@@ -164,8 +164,8 @@ def test_a_family_that_appears_in_a_stream_is_found(first: str, second: str, lig
 
 def test_small_images_are_looked_at_now_and_then() -> None:
     image = render(replace(WALL, width=400, height=300, targets=3)).image
-    identifier = create_identifier(threads=1)
-    named = create_identifier(family='metashape12', threads=1)
+    identifier = create_identifier(threads=1, follow=0)
+    named = create_identifier(family='metashape12', threads=1, follow=0)
     for each in (identifier, named, identifier):
         each.identify(image)
     usual = calls_of(lambda: named.identify(image))

@@ -31,6 +31,7 @@ from ahf_ros.families.ring.proposals import (
     measure_dots,
     measure_likely,
     propose_whole,
+    proposing,
     with_rims,
 )
 from ahf_ros.families.ring.refinement import refine_centres
@@ -38,9 +39,11 @@ from ahf_ros.families.undecoded import undecoded
 from ahf_ros.prints.ring import RingPrint
 from ahf_ros.vision import frame
 from ahf_ros.vision.circle_fit import NO_FITS, Fit
-from ahf_ros.vision.ellipse_targets import targets_from_frames
+from ahf_ros.vision.dots import Dots
+from ahf_ros.vision.ellipse_targets import frames_of, targets_from_frames
 from ahf_ros.vision.faint import faint_parts
-from ahf_ros.vision.pyramid import ImagePyramid, Octave, image_pyramid, octaves
+from ahf_ros.vision.image import as_gray, check_image
+from ahf_ros.vision.pyramid import ImagePyramid, Octave, bare_pyramid, image_pyramid, octaves
 
 _PART = 128  # dots of one colour that are read at a time
 _IN_PLACE, _EXACT = 0.6, 0.5  # edges of a dot: least share of them, largest deviation, px
@@ -68,6 +71,18 @@ class RingDetector(PyramidDetector):
         hypotheses = hypotheses_in(pyramid, self.settings, self.expected)
         found = report(hypotheses, self.settings, self.contested)
         return found, unexplained(hypotheses).frames
+
+    @one_blas_thread()
+    def confirm(self, image: np.ndarray, targets: Sequence[Target]) -> list[Target]:
+        """Return what an image shows in the places of targets; see `Confirming`."""
+        check_image(image)
+        pyramid = bare_pyramid(as_gray(image), self.settings.max_radius)
+        signs = np.array([it.polarity for it in targets], int)
+        known = proposing(Dots(frames_of(targets), signs, np.ones(len(signs))))
+        names = {it.family for it in targets}
+        shown = [code for code in self.design if code.name in names]
+        read = read_pyramid(pyramid, self.settings, self.expected, (known,), shown)
+        return report(read, self.settings, self.contested)
 
     @one_blas_thread()
     def refine(self, image: np.ndarray, targets: Sequence[Target]) -> list[Target]:
@@ -192,7 +207,7 @@ def read_pyramid(
             seen = _read(part, octave, images, likely, codes, seen, expected, every=every)
             fits.append(dots)
         measured.append((octave, Fit.joined(fits)))
-    for octave, _ in measured if shown else ():
+    for octave, _ in measured if shown and pyramid.edges else ():
         seen = _with_alike(octave, images, shown, seen, expected)
     for octave, dots in measured:
         part = octave.pyramid.gray

@@ -16,7 +16,7 @@ import time
 from collections.abc import Callable, Collection, Sequence
 from concurrent.futures import Executor, ThreadPoolExecutor
 from contextlib import nullcontext
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from functools import partial
 from numbers import Integral
 from typing import Any
@@ -58,6 +58,30 @@ MirroredId = Callable[[Target], int | None]
 _MINIMUM_MIRRORED = 3  # targets; fewer may have the IDs of a mirrored image by chance
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Seen:
+    """The last image that a detector has seen as received, and what it saw there.
+
+    Attributes
+    ----------
+    image : ndarray of uint8, shape (height, width)
+    targets : tuple of Target
+    lost : tuple of Target
+        Earlier ones that this image does not show, where they would be.
+    turn : int
+        How many images came before it.
+    """
+
+    image: np.ndarray
+    targets: tuple[Target, ...]
+    lost: tuple[Target, ...] = ()
+    turn: int = 0
+
+
+Follow = Callable[[np.ndarray, Seen], Seen]
+"""From an image and what was seen in the one before it to what it shows."""
+
+
 @dataclass(frozen=True, slots=True)
 class Memory:
     """What an identification leaves to the next one.
@@ -82,6 +106,7 @@ class Memory:
     families: tuple[str, ...] = ()
     shown: int = 0
     glanced: int = 0
+    seen: Seen | None = field(default=None, compare=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,6 +148,9 @@ class Identifier:
         again when n changes: while the filter that worked last, or none, still shows the n codes
         of the image before, light and targets are taken to be the same and no filter is searched
         for.
+    follow : callable, optional
+        The detector for an image that comes after another one, whose targets it may show again.
+        Stacks, and images that are not 8-bit, are searched wholly.
     interrupt : callable, optional
         Called before each identification; what it raises ends `identify`.
     patience : int
@@ -167,6 +195,7 @@ class Identifier:
         refine: Refinement | None = None,
         draft: DetectorFunction | None = None,
         estimate: Estimate | None = None,
+        follow: Follow | None = None,
         interrupt: Callable[[], None] | None = None,
         patience: int = 0,
         contested: bool = False,
@@ -180,6 +209,7 @@ class Identifier:
         self.memory = Memory()
         # Without a refinement, centres are those of the detector.
         draft = draft if draft and refine else detector
+        self._interrupt = interrupt or (lambda: None)
         self._detector = _interruptible(detector, interrupt)
         self._draft = _interruptible(draft, interrupt)
         self._settings = settings = settings or AdaptiveSettings()
@@ -191,6 +221,7 @@ class Identifier:
         self._expected_targets = expected_targets
         self._refine = refine
         self._estimate = estimate
+        self._follow = follow
         self._clock = clock
         self._contested = contested
         self._mirrored = mirrored
@@ -269,6 +300,7 @@ class Identifier:
         listed, wanted_ids = settings.listed, settings.wanted
         expected = len(wanted_ids) or given
         estimating = not expected and self._estimate is not None
+        seen = self._look_again(trials)
         threads = settings.threads or os.cpu_count() or 1
         with ThreadPoolExecutor(threads) if threads > 1 else nullcontext() as executor:
             choice = self._steady(trials, executor) if estimating else None
@@ -286,7 +318,8 @@ class Identifier:
             targets = [it for it in targets if not _is_certain_alone(it)]
         self.last_search = choice.search
         settled = (trials.count(choice.filter), choice.expected) if estimating else None
-        self.memory = replace(self.memory, filter=choice.remembered, settled=settled)
+        seen = seen or self._seen_in(trials)
+        self.memory = replace(self.memory, filter=choice.remembered, settled=settled, seen=seen)
         number, gains = trials.parts(choice.filter)
         received = trials.image(choice.filter)
         if self._refine and (gains or fusing or received.dtype != np.uint8):
@@ -319,6 +352,25 @@ class Identifier:
     def _trials(self, stack: ImageStack) -> Trials:
         """Return what is known of an image or stack before it is identified: nothing."""
         return Trials(stack, self._detector, self._draft, self._settings, self._name)
+
+    def _look_again(self, trials: Trials) -> Seen | None:
+        """Note what an image shows as received if the one before it tells where to look."""
+        before, image = self.memory.seen, trials.image(trials.plain[0])
+        alone = trials.plain == (None,) and image.dtype == np.uint8
+        if not (self._follow and before and alone) or trials.found or self.memory.filter:
+            return None
+        self._interrupt()
+        seen = self._follow(image, before)
+        trials.know(None, checked_targets(seen.targets, self._name))
+        return seen
+
+    def _seen_in(self, trials: Trials) -> Seen | None:
+        """Return what was seen in an image as received, if the next one may show it again."""
+        image = trials.image(trials.plain[0])
+        if not self._follow or None not in trials.found or image.dtype != np.uint8:
+            return None
+        # The caller may take the next image into the same array.
+        return Seen(image.copy(), tuple(trials.found[None]))
 
     def _chosen(self, trials: Trials, expected: int, executor: Executor | None) -> _Choice:
         """Return what shows n targets with the smallest |N - n|; N is 0 if it is unknown."""

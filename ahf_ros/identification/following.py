@@ -1,0 +1,330 @@
+"""Targets that are followed from one image to the next.
+
+Known targets are looked for near the places where the last image showed them, and read again there
+by all evidence. How they moved tells how the image did. Where it shows something else than the
+last one, moved alike, it is searched as any image is; so are the places of targets that could not
+be read again, and, image by image, one part after the other of what seems not to have changed.
+Where less than half of the targets are confirmed, or something contradicts them, the image is
+searched wholly, as the first one was.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations
+
+import cv2
+import numpy as np
+
+from ahf_ros.base.target import (
+    UNDECODED,
+    DottedTarget,
+    Prints,
+    SquareMarker,
+    Target,
+    reach_of,
+    sorted_targets,
+)
+from ahf_ros.families.explained import without_targets
+from ahf_ros.identification.filtering.identifier import Seen
+from ahf_ros.identification.filtering.trials import DetectorFunction
+
+Box = tuple[int, int, int, int]
+"""A part of an image: its edges left, top, right and bottom, px."""
+
+_AROUND = 1.6  # half the side of what is looked for again, in semi-axes of a target's ellipse
+_FARTHEST = 1.5  # by which a target may have moved, in its semi-axes
+_SEMI_AXIS = 5.0  # px; larger targets are looked for again in a smaller image
+_LEAST = 0.5  # share of the known targets that are confirmed
+_STILL = 0.3  # px; images that moved by less are compared as they are
+_TELLING = 8  # targets that tell an affine movement, not only how far
+_NEAR, _PIXELS = 0.5, 2.0  # semi-axes, or px, between two places of one target
+_TILE = 32  # side of what has changed or has not, px of the half
+_CHANGED = 6  # pixels of a tile that show another image
+_NOISE = 4.0  # deviations of noise beyond the gray values next to a pixel
+_STEP = 3  # gray values, beside noise
+_MARGIN = 1.15  # times the reach of a target, within which its edges are
+_AT_LEAST = 32  # px about what has changed
+_MOST = 0.3  # share of an image that is searched in parts
+
+
+@dataclass(frozen=True, slots=True)
+class Following:
+    """From an image and what was seen in the one before it to the targets that it shows.
+
+    Attributes
+    ----------
+    detector : callable
+        From an image, or a part of one, to its targets.
+    confirm : callable
+        As `ahf_ros.families.contract.Confirming` has it.
+    prints : mapping of str to FamilyRecord
+        The families of targets by their names.
+    interval : int
+        Images in which each part of an image that has not changed is searched again.
+    """
+
+    detector: DetectorFunction
+    confirm: Callable[[np.ndarray, Sequence[Target]], list[Target]]
+    prints: Prints
+    interval: int
+
+    def __call__(self, image: np.ndarray, before: Seen) -> Seen:
+        """Return what an image shows; the targets that were confirmed are marked as followed.
+
+        Parameters
+        ----------
+        image : ndarray of uint8, shape (height, width)
+        before : Seen
+            In the image before.
+        """
+        if np.array_equal(before.image, image):
+            return before
+        after = self._followed(image, before) if before.image.shape == image.shape else None
+        # The caller may take the next image into the same array.
+        return after or Seen(image.copy(), tuple(self.detector(image)))
+
+    def _followed(self, image: np.ndarray, before: Seen) -> Seen | None:
+        """Return what an image shows, None if it must be searched wholly."""
+        known = [it for it in before.targets if it.id != UNDECODED]
+        expected = list(_where(before.image, image, known))
+        confirmed = _alike(self.confirm(image, expected), expected) if known else {}
+        if len(confirmed) < _LEAST * len(known):
+            return None
+        followed = [replace(target, followed=True) for target in confirmed.values()]
+        movement = _movement([known[index] for index in confirmed], followed)
+        lost = [it for index, it in enumerate(known) if index not in confirmed]
+        lost += [*before.lost, *(it for it in before.targets if it.id == UNDECODED)]
+        height, width = image.shape
+        lost = [_displaced(it, *(_to(movement, it) - (it.x, it.y))) for it in lost]
+        lost = [it for it in lost if _holds((0, 0, width, height), it)]
+        reach = max(map(self._reach, (*known, *lost)), default=0.0)
+        part = _part(image.shape, before.turn, self.interval)
+        boxes = [_grown(part, math.ceil(max(reach, _AT_LEAST)), image.shape)]
+        boxes += self._places(lost, image.shape)
+        changed = _changed(image, _moved(before.image, movement))
+        boxes += self._changes(changed, followed, math.ceil(max(2 * reach, _AT_LEAST)))
+        boxes = _joined(boxes)
+        if sum(map(_area, boxes)) > _MOST * image.size:
+            boxes = [(0, 0, width, height)]
+        new: list[Target] = []
+        for box in boxes:
+            found = self._searched(image, box, followed)
+            new += [it for it in found if not any(_is_same(it, of) for of in new)]
+        prints = [it.print for it in (*followed, *new) if it.id != UNDECODED]
+        if len(set(prints)) < len(prints):
+            return None
+        # What is lost is looked for in each image, until all of its part has been searched.
+        lost = [it for it in lost if it.print not in prints and not _holds(part, it)]
+        targets = tuple(sorted_targets([*followed, *new]))
+        return Seen(image.copy(), targets, tuple(lost), before.turn + 1)
+
+    def _reach(self, target: Target) -> float:
+        """Return the radius of a target with the blur of its edges, px."""
+        if isinstance(target, DottedTarget) and target.dots:
+            return _MARGIN * max(
+                math.hypot(x - target.x, y - target.y) + size for x, y, size, *_ in target.dots
+            )
+        return _MARGIN * reach_of(target, self.prints) * target.semi_major
+
+    def _places(self, lost: Iterable[Target], shape: tuple[int, int]) -> Iterator[Box]:
+        """Yield the parts of an image in which targets are looked for that are lost."""
+        for it in lost:
+            x, y = round(it.x), round(it.y)
+            yield _grown((x, y, x + 1, y + 1), math.ceil(2 * self._reach(it)), shape)
+
+    def _changes(
+        self, changed: np.ndarray, followed: Iterable[Target], margin: int
+    ) -> Iterator[Box]:
+        """Yield the parts of an image that changed beside its targets, with a margin."""
+        for it in followed:
+            centre = round((it.x - 0.5) / 2), round((it.y - 0.5) / 2)
+            cv2.circle(changed, centre, math.ceil(self._reach(it) / 2), 0, cv2.FILLED)
+        height, width = changed.shape
+        padded = np.pad(changed, ((0, -height % _TILE), (0, -width % _TILE)))
+        rows, columns = (side // _TILE for side in padded.shape)
+        counts = padded.reshape(rows, _TILE, columns, _TILE).sum(axis=(1, 3), dtype=int)
+        tiles = (counts >= _CHANGED).astype(np.uint8)
+        _, _, found, _ = cv2.connectedComponentsWithStats(tiles, connectivity=8)
+        for left, top, across, down, _ in (2 * _TILE * found[1:]).tolist():
+            box = left, top, left + across, top + down
+            yield _grown(box, margin, (2 * height, 2 * width))
+
+    def _searched(self, image: np.ndarray, box: Box, followed: Iterable[Target]) -> list[Target]:
+        """Return what a part of an image shows beside targets that are followed."""
+        left, top, right, bottom = box
+        part = np.ascontiguousarray(image[top:bottom, left:right])
+        near = (_displaced(it, -left, -top) for it in followed if self._within(it, box, -1.0))
+        found = self.detector(without_targets(part, near, self.prints))
+        height, width = image.shape
+        # What touches an edge that the image does not have may be a part of something else.
+        inner = (
+            left if left else -math.inf,
+            top if top else -math.inf,
+            right if right < width else math.inf,
+            bottom if bottom < height else math.inf,
+        )
+        new = (_displaced(it, left, top) for it in found)
+        return [it for it in new if self._within(it, inner, 1.0)]
+
+    def _within(self, target: Target, box: tuple[float, ...], sign: float) -> bool:
+        """Return whether a target is wholly in a part of an image; in a part, if sign is -1."""
+        left, top, right, bottom = box
+        reach = sign * self._reach(target)
+        across = left <= target.x - reach and target.x + reach <= right
+        return across and top <= target.y - reach and target.y + reach <= bottom
+
+
+def _where(before: np.ndarray, image: np.ndarray, known: Sequence[Target]) -> Iterator[Target]:
+    """Yield targets of the image before where this one looks most like them, to a pixel or two."""
+    for it in known:
+        level = max(0, math.floor(math.log2(max(it.semi_minor, 1.0) / _SEMI_AXIS) + 0.5))
+        size = 2**level
+        half = math.ceil(_AROUND * it.semi_major / size)
+        reach = max(2, math.ceil(_FARTHEST * it.semi_major / size))
+        x, y = (math.floor((of + 0.5) / size) for of in (it.x, it.y))
+        shown = _cut(before, x, y, half, size)
+        around = _cut(image, x, y, half + reach, size)
+        if shown is None or around is None:
+            yield it
+            continue
+        likeness = cv2.matchTemplate(around, shown, cv2.TM_CCOEFF_NORMED)
+        row, column = divmod(int(likeness.argmax()), likeness.shape[1])
+        yield _displaced(it, (column - reach) * size, (row - reach) * size)
+
+
+def _cut(image: np.ndarray, x: int, y: int, half: int, size: int) -> np.ndarray | None:
+    """Return the square about a pixel of an image that is reduced by `size`, None at its edge."""
+    left, top = (of - half for of in (x, y))
+    right, bottom = (of + half + 1 for of in (x, y))
+    height, width = image.shape
+    if left < 0 or top < 0 or right * size > width or bottom * size > height:
+        return None
+    part = image[top * size : bottom * size, left * size : right * size]
+    side = 2 * half + 1
+    return cv2.resize(part, (side, side), interpolation=cv2.INTER_AREA) if size > 1 else part
+
+
+def _alike(found: Iterable[Target], expected: Sequence[Target]) -> dict[int, Target]:
+    """Return which targets were found with their print where they were expected, by index."""
+    prints: dict[tuple[str, int, int], int] = {}
+    for index, it in enumerate(expected):
+        prints[it.print] = index
+    confirmed: dict[int, Target] = {}
+    for it in found:
+        index = prints.get(it.print, -1)
+        if index >= 0 and _is_same(it, expected[index]):
+            confirmed[index] = it
+    return confirmed
+
+
+def _is_same(one: Target, other: Target) -> bool:
+    """Return whether two readings are of one target."""
+    near = math.hypot(one.x - other.x, one.y - other.y) < max(_NEAR * other.semi_major, _PIXELS)
+    return near and one.print == other.print
+
+
+def _movement(old: Sequence[Target], new: Sequence[Target]) -> np.ndarray:
+    """Return the affine map, (2, 3), from the image before that targets tell."""
+    if not old:
+        return np.eye(2, 3)
+    start, end = (np.array([(it.x, it.y) for it in of]) for of in (old, new))
+    shift = np.median(end - start, axis=0)
+    if len(old) < _TELLING or np.hypot(*shift) < _STILL:
+        return np.column_stack([np.eye(2), shift])
+    places = np.column_stack([start, np.ones(len(old))])
+    return np.linalg.lstsq(places, end, rcond=None)[0].T
+
+
+def _to(movement: np.ndarray, target: Target) -> np.ndarray:
+    """Return where a movement brings the centre of a target, (2,)."""
+    return movement @ (target.x, target.y, 1.0)
+
+
+def _moved(image: np.ndarray, movement: np.ndarray) -> np.ndarray:
+    """Return an image after a movement."""
+    height, width = image.shape
+    if np.abs(movement - np.eye(2, 3)).max() < _STILL:
+        return image
+    return cv2.warpAffine(image, movement, (width, height), borderMode=cv2.BORDER_REPLICATE)
+
+
+def _changed(image: np.ndarray, before: np.ndarray) -> np.ndarray:
+    """Return where the half of an image is not what it was, or lies next to it; uint8, 1 or 0."""
+    height, width = image.shape
+    now, then = (
+        cv2.resize(it, (width // 2, height // 2), interpolation=cv2.INTER_AREA)
+        for it in (image, before)
+    )
+    beside = np.ones((3, 3), np.uint8)
+    above = cv2.subtract(now, cv2.dilate(then, beside))
+    below = cv2.subtract(cv2.erode(then, beside), now)
+    limit = _NOISE * _noise(now) + _STEP
+    return cv2.threshold(cv2.max(above, below), limit, 1, cv2.THRESH_BINARY)[1]
+
+
+def _noise(image: np.ndarray) -> float:
+    """Return the usual deviation of noise in an image; see `ahf_ros.vision.noise`."""
+    some = image[: len(image) // 8 * 8].reshape(-1, 8, image.shape[1])[:, :3].astype(np.int16)
+    across = some[:, :, 2:] - 2 * some[:, :, 1:-1] + some[:, :, :-2]
+    mask = np.abs(across[:, 0] - 2 * across[:, 1] + across[:, 2])
+    return 1.4826 * float(np.median(mask)) / 6
+
+
+def _part(shape: tuple[int, int], turn: int, interval: int) -> Box:
+    """Return the part of an image whose turn it is."""
+    height, width = shape
+    columns = max(1, round(math.sqrt(interval * width / height)))
+    rows = max(1, interval // columns)
+    row, column = divmod(turn % (rows * columns), columns)
+    left, right = (width * it // columns for it in (column, column + 1))
+    top, bottom = (height * it // rows for it in (row, row + 1))
+    return left, top, right, bottom
+
+
+def _holds(box: Box, target: Target) -> bool:
+    return box[0] <= target.x < box[2] and box[1] <= target.y < box[3]
+
+
+def _grown(box: Box, margin: int, shape: tuple[int, int]) -> Box:
+    """Return a part of an image with a margin about it."""
+    left, top, right, bottom = box
+    height, width = shape
+    return (
+        max(left - margin, 0),
+        max(top - margin, 0),
+        min(right + margin, width),
+        min(bottom + margin, height),
+    )
+
+
+def _joined(boxes: Iterable[Box]) -> list[Box]:
+    """Return parts of an image, two as one where this is not more to search."""
+    joined = list(boxes)
+    while True:
+        for first, second in combinations(range(len(joined)), 2):
+            one, other = joined[first], joined[second]
+            left, top = min(one[0], other[0]), min(one[1], other[1])
+            both = left, top, max(one[2], other[2]), max(one[3], other[3])
+            if _area(both) <= _area(one) + _area(other):
+                joined[first] = both
+                del joined[second]
+                break
+        else:
+            return joined
+
+
+def _area(box: Box) -> int:
+    return (box[2] - box[0]) * (box[3] - box[1])
+
+
+def _displaced(target: Target, x: float, y: float) -> Target:
+    """Return a target that lies elsewhere in an image."""
+    moved = replace(target, x=target.x + x, y=target.y + y)
+    if isinstance(moved, SquareMarker):
+        return replace(moved, corners=tuple((of[0] + x, of[1] + y) for of in moved.corners))
+    if isinstance(moved, DottedTarget):
+        return replace(moved, dots=tuple((of[0] + x, of[1] + y, *of[2:]) for of in moved.dots))
+    return moved
