@@ -22,30 +22,31 @@ static inline double geman_mcclure_gain(double error)
     return (1.0 - 3.0 * square) / ((1.0 + square) * squared(1.0 + square));
 }
 
-/* The value of a rank among n, whose order changes: Hoare's algorithm 65, Comm. ACM 4, 1961. */
+/* The value of a rank among n, whose order changes. Parts of values follow each other without a
+   branch, which no processor could predict. */
 static inline double ranked(count n, double values[n], count rank)
 {
-    count low = 0, high = n - 1;
-    while (low < high) {
-        double pivot = values[rank];
-        count i = low, j = high;
-        do {
-            while (values[i] < pivot)
-                i++;
-            while (pivot < values[j])
-                j--;
-            if (i <= j) {
-                double swapped = values[i];
-                values[i++] = values[j];
-                values[j--] = swapped;
-            }
-        } while (i <= j);
-        if (j < rank)
-            low = i;
-        if (rank < i)
-            high = j;
+    for (count low = 0, high = n;;) {
+        double pivot = values[low + (high - low) / 2];
+        count less = low, same; /* where values end that are less than the pivot, or as it is */
+        for (count i = low; i < high; i++) {
+            double value = values[i];
+            values[i] = values[less];
+            values[less] = value;
+            less += value < pivot;
+        }
+        same = less;
+        for (count i = less; i < high && rank >= less; i++) {
+            double value = values[i];
+            values[i] = values[same];
+            values[same] = value;
+            same += !(pivot < value);
+        }
+        if (rank >= less && rank < same)
+            return pivot;
+        low = rank < less ? low : same;
+        high = rank < less ? less : high;
     }
-    return values[rank];
 }
 
 /* The lower median of selected values, or `empty`. */
