@@ -8,33 +8,6 @@
 
 static const float NEVER_SEEN = 1e9f; /* more than any gray value, or radius */
 
-/* Gray values at r radii, of all m angles or of each, between the two circles beside them: of k
-   targets, each in one of i images of c circles from `innermost` to `outermost`. */
-void gray_at(count k, count i, count c, count m, count r, count g, const float gray[i][c][m],
-             const int64_t row[k], double innermost, const double outermost[k],
-             const double radii[k][r][g], float values[k][r][m])
-{
-    for (count b = 0; b < k; b++) {
-        double spacing = (outermost[b] - innermost) / (double)(c - 1);
-        const float(*image)[m] = gray[within(row[b], i)];
-        for (count j = 0; j < r; j++) {
-            const float *below = image[0], *above = image[0];
-            float share = 0;
-            for (count a = 0; a < m; a++) {
-                if (a == 0 || g > 1) {
-                    double place = (radii[b][j][a] - innermost) / spacing;
-                    place = greater(lesser((double)(c - 1), place), 0.0);
-                    count low = (count)place;
-                    share = (float)(place - (double)low);
-                    below = image[low];
-                    above = image[low + 1 < c ? low + 1 : low];
-                }
-                values[b][j][a] = below[a] * (1 - share) + above[a] * share;
-            }
-        }
-    }
-}
-
 /* Share of ink at a distance from the edge that blur made of it, in deviations. */
 static inline double blurred(double distance)
 {
@@ -252,39 +225,6 @@ void covered_ground(count k, count m, const float ground[k][2][m], const float b
             for (count side = 0; side < 2; side++)
                 covered[b][side][a] =
                     dim[side] || (dim[1 - side] && ground_as_ink[1 - side] && across);
-        }
-    }
-}
-
-/* Votes for s outlines of dark ground about bright targets: at each angle, one for each circle
-   beyond the outline that is brighter than `white`, less one for each that is darker. Circles
-   nearer than `least` do not vote. `beyond` is the number of circles beyond an outline at an angle.
-   Where the outermost circle is not brighter, which its votes tell, there are none for outlines. */
-void ground_votes(count k, count i, count c, count m, count s, const float gray[i][c][m],
-                  const int64_t row[k], const float white[k][m], const double radii[k][c],
-                  const double least[k], const int64_t beyond[s][m], int64_t votes[k][s],
-                  int64_t outermost[k], int32_t sums[c][m])
-{
-    for (count b = 0; b < k; b++) {
-        const float(*image)[m] = gray[within(row[b], i)];
-        for (count j = 0; j < c; j++) { /* from the outermost circle inwards */
-            count circle = c - 1 - j;
-            int32_t counts = radii[b][circle] >= least[b];
-            const float *here = image[circle], *bound = white[b];
-            for (count a = 0; a < m; a++) {
-                int32_t vote = (here[a] > bound[a]) - (here[a] < bound[a]);
-                sums[j][a] = (j > 0 ? sums[j - 1][a] : 0) + counts * vote;
-            }
-        }
-        outermost[b] = 0;
-        for (count a = 0; a < m; a++)
-            outermost[b] += sums[0][a];
-        for (count shape = 0; shape < s; shape++) {
-            int64_t sum = 0;
-            for (count a = 0; a < m && outermost[b] > 0; a++)
-                if (beyond[shape][a] > 0)
-                    sum += sums[within(beyond[shape][a] - 1, c)][a];
-            votes[b][shape] = sum;
         }
     }
 }

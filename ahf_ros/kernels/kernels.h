@@ -26,11 +26,24 @@ void normal_shares(count n, const double x[n], double y[n]);
 void exponentials_f(count n, const float x[n], float y[n]);
 void logarithms_f(count n, const float x[n], float y[n]);
 
-/* band_edges.c */
+/* polar.c */
 
+void circle_values(count h, count w, count k, count r, count m, const float image[h][w],
+                   const double frames[k][3][3], const double directions[2][m],
+                   const double radii[k][r], float values[k][r][m], double reach[k][m]);
+void second_differences(count h, count w, count k, count m, const float image[h][w],
+                        const double frames[k][3][3], const double points[2][m], double medians[k],
+                        double scratch[m]);
 void gray_at(count k, count i, count c, count m, count r, count g, const float gray[i][c][m],
              const int64_t row[k], double innermost, const double outermost[k],
              const double radii[k][r][g], float values[k][r][m]);
+void ground_votes(count k, count i, count c, count m, count s, const float gray[i][c][m],
+                  const int64_t row[k], const float white[k][m], const double radii[k][c],
+                  const double least[k], const int64_t beyond[s][m], int64_t votes[k][s],
+                  int64_t outermost[k], int32_t sums[c][m]);
+
+/* band_edges.c */
+
 void ink_shares(count k, count r, count g, count m, const double radii[k][r][g],
                 const double plate[k][m], const double dot[k], const double inner[k],
                 const double outer[k], const double blur[k], float bare[k][r][m],
@@ -49,10 +62,6 @@ void covered_ground(count k, count m, const float ground[k][2][m], const float b
                     const bool visible[k][2][m], const float shade[k], const float contrast[k],
                     const bool dark[k], float offset, float white, float light_edge,
                     float marked_share, bool covered[k][2][m]);
-void ground_votes(count k, count i, count c, count m, count s, const float gray[i][c][m],
-                  const int64_t row[k], const float white[k][m], const double radii[k][c],
-                  const double least[k], const int64_t beyond[s][m], int64_t votes[k][s],
-                  int64_t outermost[k], int32_t sums[c][m]);
 
 /* bands.c */
 

@@ -49,6 +49,15 @@ static inline double ranked(count n, double values[n], count rank)
     }
 }
 
+/* The median of values, whose order changes. */
+static inline double middle(count n, double values[n])
+{
+    double upper = ranked(n, values, n / 2), lower = values[0];
+    for (count i = 0; i < n / 2; i++)
+        lower = lower > values[i] ? lower : values[i];
+    return n % 2 ? upper : (lower + upper) / 2;
+}
+
 /* The lower median of selected values, or `empty`. */
 static inline double median(count n, const double values[n], const bool selected[n], double empty,
                             double scratch[n])

@@ -49,7 +49,7 @@ def polar(
     dark = inked == (polarity > 0)
     lit = np.broadcast_to(np.asarray(light, float), ANGLES)[:, None]
     return PolarImages(
-        gray=np.where(dark, contrast * lit, lit).astype(np.float32)[None],
+        gray=np.where(dark, contrast * lit, lit).T.astype(np.float32)[None],
         row=np.zeros(1, int),
         reach=np.full((1, ANGLES), np.inf),
         outermost=np.array([OUTERMOST]),
@@ -97,14 +97,14 @@ def test_bands_grow_on_both_sides() -> None:
 
 def test_what_is_neither_paper_nor_ink_speaks_against_both() -> None:
     between = polar()
-    between.gray[:, :20, inside(*BAND)] = 110.0
+    between.gray[:, inside(*BAND), :20] = 110.0
     evidence = edges(between)
     assert (np.maximum(evidence.paper, evidence.ink)[..., :20] < 0).all()
 
 
 def test_the_halves_of_a_band_are_seen_apart() -> None:
     half = polar()
-    half.gray[:, :10, inside(3, BAND[1])] = 110.0  # only the outer edge
+    half.gray[:, inside(3, BAND[1]), :10] = 110.0  # only the outer edge
     whole, seen = map(edges, (polar(), half))
     assert seen.ink[0, 0] == pytest.approx(whole.ink[0, 0])
     assert (seen.ink[0, 1, :10] < 0).all()
@@ -122,7 +122,7 @@ def test_angles_that_the_image_does_not_show_say_nothing() -> None:
 
 def test_white_bands_under_glare_say_nothing_but_over_exposed_paper_does() -> None:
     glare, white = polar(), polar(light=255.0, glare=np.inf)
-    glare.gray[:, :20] = 255.0
+    glare.gray[..., :20] = 255.0
     of_glare, of_white = map(edges, (glare, white))
     assert not of_glare.paper[..., :20].any()
     assert not of_glare.ink[..., :20].any()
@@ -150,7 +150,7 @@ def test_readings_of_neighbours_that_are_alike_share_one_weight() -> None:
 
 def test_gaps_tell_how_often_light_has_edges() -> None:
     calm, restless = polar(), polar()
-    restless.gray[:, ::3, RADII > 1.6] *= 0.3
+    restless.gray[:, RADII > 1.6, ::3] *= 0.3
     inner = np.array([BAND[0]])
     assert light_edges(calm, ONE, NONE, inner).tolist() == [0.05]
     assert light_edges(restless, ONE, NONE, inner)[0] == pytest.approx(1 / 3, abs=0.02)
@@ -185,7 +185,7 @@ def test_levels_tell_ink_from_paper_where_light_is_known(polarity: int, paper: f
 
 def test_ground_beside_the_band_that_is_not_as_predicted_speaks_against_both() -> None:
     target = polar()
-    target.gray[:, :8, inside(BAND[1], 9)] = 90.0  # something lies on the margin
+    target.gray[:, inside(BAND[1], 9), :8] = 90.0  # something lies on the margin
     evidence = by_levels(target, spread=0.02)
     assert (evidence.ink[0, 1, :8] < evidence.ink[0, 1, 20:28] - 0.5).all()
     assert (evidence.ink[0, 0, :8] == evidence.ink[0, 0, 20:28]).all()  # of the half inside
@@ -212,7 +212,7 @@ def test_a_dot_of_light_on_paper_is_no_ink() -> None:
 
 def test_what_covers_the_ground_covers_the_edge_beside_it_and_the_levels() -> None:
     target = polar(shade=100.0)
-    target.gray[:, 5:8, inside(BAND[1], 9)] = 90.0
+    target.gray[:, inside(BAND[1], 9), 5:8] = 90.0
     of_steps = edges(target)
     seen = by_levels(target, shares=SHARES)
     both = of_steps.plus(seen)

@@ -49,8 +49,9 @@ def test_what_is_dark_on_a_small_part_of_the_ground_covers_it() -> None:
 
 def test_circles_are_read_between_two_others() -> None:
     of = polar(DOT)
-    radii = np.linspace(0.3, of.outermost[0], of.gray.shape[2])
-    slope = replace(of, gray=np.broadcast_to(radii.astype(np.float32), of.gray.shape))
+    radii = np.linspace(0.3, of.outermost[0], of.gray.shape[1])
+    rising = np.broadcast_to(radii.astype(np.float32)[:, None], of.gray.shape)
+    slope = replace(of, gray=rising)
     for radius in (0.3, 1.234, of.outermost[0] - 0.01):
         assert slope.at(np.array([[[radius]]])) == pytest.approx(radius, abs=1e-5)
 

@@ -84,7 +84,7 @@ def _step_shares(polar: PolarImages, ground: np.ndarray) -> np.ndarray:
 
     That light is a plane in ln, as a lamp nearby makes it.
     """
-    values = np.log(polar.gray[polar.row] + np.float32(LOG_OFFSET))
+    values = np.log(polar.gray[polar.row].swapaxes(1, 2) + np.float32(LOG_OFFSET))
     angles, radii = angles_of(ground.shape[1])[:, None], polar.radii[0]
     plane = np.stack([np.ones(ground.shape[1:]), *(radii * of(angles) for of in (np.cos, np.sin))])
     beyond = np.asarray(ground.any(axis=(0, 1)))

@@ -146,7 +146,7 @@ def weights(polar: PolarImages) -> np.ndarray:
 
     They add up to the same for bands of all families, so that their evidence can be compared.
     """
-    angles = polar.gray.shape[1]
+    angles = polar.gray.shape[2]
     along = 2 * np.pi * _RADIUS * polar.size / angles / CORRELATION
     return np.minimum(along, min(1.0, _ANGLES / angles)).astype(np.float32)
 
@@ -241,7 +241,7 @@ def _blurred(
 
 def _blur_along(polar: PolarImages, band: tuple[float, float]) -> np.ndarray:
     """Return the blur of ends of arcs, standard deviations in angles, shape (k,)."""
-    return np.asarray(polar.blur / (np.pi * sum(band) * polar.size / polar.gray.shape[1]))
+    return np.asarray(polar.blur / (np.pi * sum(band) * polar.size / polar.gray.shape[2]))
 
 
 def light_edges(

@@ -8,7 +8,6 @@ from functools import lru_cache
 import numpy as np
 
 from ahf_ros import kernels
-from ahf_ros.vision import frame
 from ahf_ros.vision.array_record import ArrayRecord
 from ahf_ros.vision.black import black_lift, lifted
 from ahf_ros.vision.circle_fit import Fit
@@ -18,7 +17,6 @@ from ahf_ros.vision.noise import reading_noise
 from ahf_ros.vision.normal import normal_integral
 from ahf_ros.vision.profiles import USUAL_BLUR
 from ahf_ros.vision.robust import NORMAL, medians
-from ahf_ros.vision.sampling import sample_circles, within
 
 CORRELATION = 2.5
 """Distance of independent readings, px."""
@@ -42,7 +40,6 @@ CIRCLES = 56
 """Of a polar image, which are then less than a tenth of a dot radius apart."""
 
 _INNERMOST, _MARGIN = 0.3, 0.95  # first circle, and last one beyond the band, dot radii
-_PERSPECTIVE = 1.5  # of circles, more than perspective makes one side of them larger
 _PRINTED = 0.25  # usual contrast of prints, up to which the levels of dots count
 _LEVELS = np.array([0.75, 1.4])  # where those of dot and gap are read, radii of the dot as seen
 _MINIMUM_SHARE = 0.3  # of ink that a level tells, between those of dot and gap
@@ -67,8 +64,8 @@ class PolarImages(ArrayRecord):
 
     Attributes
     ----------
-    gray : ndarray of float32, shape (i, m, n)
-        Of i images; black is lifted, see `ahf_ros.vision.black`.
+    gray : ndarray of float32, shape (i, n, m)
+        Of i images, circle by circle; black is lifted, see `ahf_ros.vision.black`.
     row : ndarray of int, shape (k,)
         Which of these images is that of a dot.
     reach : ndarray of float64, shape (k, m)
@@ -112,7 +109,7 @@ class PolarImages(ArrayRecord):
     @property
     def radii(self) -> np.ndarray:
         """Radii of the circles, dot radii, shape (k, n)."""
-        return np.linspace(_INNERMOST, self.outermost, self.gray.shape[2], axis=1)
+        return np.linspace(_INNERMOST, self.outermost, self.gray.shape[1], axis=1)
 
     def select(self, which: np.ndarray | slice) -> PolarImages:
         """Return some of the dots; their images are those of all, which are not copied."""
@@ -137,8 +134,7 @@ class PolarImages(ArrayRecord):
 
         The radii are in dot radii.
         """
-        gray = self.gray.swapaxes(1, 2)
-        return kernels.gray_at(gray, self.row, _INNERMOST, self.outermost, radii)
+        return kernels.gray_at(self.gray, self.row, _INNERMOST, self.outermost, radii)
 
     def inked(self, paper: np.ndarray, seen: np.ndarray) -> np.ndarray:
         """Return the gray values of ink of the dot's colour where paper has some, (k, ...).
@@ -191,26 +187,23 @@ def polar_images(
     circles: int = CIRCLES,
 ) -> PolarImages:
     """Return the polar images of targets at some angles, see `angles_of`, on some circles."""
-    angles, (inner, outer) = angles_of(count), band
+    inner, outer = band
     outermost = outer + _MARGIN
     radii = np.linspace(_INNERMOST, outermost, circles)
-    values = sample_circles(gray, dots.frames, angles, radii)
-    np.maximum(values, 0, out=values)
+    values, reach = _on_circles(gray, dots, angles_of(count), np.tile(radii, (len(dots.frames), 1)))
     contrast, lift = _appearance(gray, dots, band)
     values = lifted(values, lift.astype(np.float32)[:, None, None])
     places = [*(1 + (inner - 1) * GAP), *(outer + MARGIN)]
-    ground = values[:, :, [np.abs(radii - place).argmin() for place in places]]
+    ground = values[:, [np.abs(radii - place).argmin() for place in places]]
     apart = 2 * np.pi * inner * dots.size / count
-    later = _later(ground, apart)
     noise = np.clip(reading_noise(gray, dots.frames, outermost), *_NOISE)
-    shade, glare = _usual_levels(ground, later, noise)
+    shade, glare = _usual_levels(ground, _later(ground, apart), noise)
     # A camera that sharpens darkens dark ground beside bright marks; nothing there is darker.
     shade = np.where(dots.polarity > 0, shade, np.float32(0))
     return PolarImages(
-        # Circle by circle in memory, as they are read.
-        gray=np.ascontiguousarray(values.swapaxes(1, 2)).swapaxes(1, 2),
+        gray=values,
         row=np.arange(len(values)),
-        reach=_reach(gray.shape, dots.frames, angles, radii),
+        reach=reach,
         outermost=np.full(len(values), outermost),
         polarity=dots.polarity,
         contrast=contrast,
@@ -222,6 +215,18 @@ def polar_images(
         shade=shade,
         glare=glare,
     )
+
+
+def _on_circles(
+    gray: np.ndarray, dots: Fit, angles: np.ndarray, radii: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return gray values, not below 0, on circles of radii (k, n) at angles (m,), (k, n, m).
+
+    With them comes up to which of the radii the image shows targets at angles, (k, m).
+    """
+    directions = np.array([np.cos(angles), np.sin(angles)])
+    values, reach = kernels.circle_values(gray, dots.frames, directions, radii)
+    return np.maximum(values, 0, out=values), reach
 
 
 def angles_of(count: int) -> np.ndarray:
@@ -244,8 +249,8 @@ def _appearance(
     radius = 1 + dots.polarity * dots.edge_shift / dots.size
     beside = radius[:, None] * _LEVELS
     ground = np.broadcast_to(outer + MARGIN, (len(radius), len(MARGIN)))
-    values = sample_circles(gray, dots.frames, angles, np.hstack([beside, ground]))
-    inside, outside, *beyond = np.moveaxis(np.maximum(values, _MINIMUM_LEVEL), 2, 0)
+    values, _ = _on_circles(gray, dots, angles, np.hstack([beside, ground]))
+    inside, outside, *beyond = np.maximum(values, _MINIMUM_LEVEL).swapaxes(0, 1)
     deep, near = normal_integral((radius[:, None] - beside) * (dots.size / dots.blur)[:, None]).T
     by_levels, bare = (
         _unmixed(medians(inside / of), deep, share) ** dots.polarity
@@ -266,17 +271,17 @@ def _unmixed(ratio: np.ndarray, first: np.ndarray, second: np.ndarray | float) -
 
 
 def _later(ground: np.ndarray, apart: np.ndarray) -> np.ndarray:
-    """Return the readings at angles that are far enough from those of readings (k, m, 4)."""
-    count = ground.shape[1]
+    """Return the readings at angles that are far enough from those of readings (k, 4, m)."""
+    count = ground.shape[2]
     lags = np.clip(np.ceil(CORRELATION / np.maximum(apart, 1e-9)), 1, count // 4).astype(np.intp)
     later = (np.arange(count) + lags[:, None]) % count
-    return np.asarray(ground[np.arange(len(ground))[:, None], later])
+    return np.asarray(np.take_along_axis(ground, later[:, None], axis=2))
 
 
 def _usual_levels(
     ground: np.ndarray, later: np.ndarray, noise: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return between which gray values the light on ground (k, m, 4) makes it, shape (k,) each.
+    """Return between which gray values the light on ground (k, 4, m) makes it, shape (k,) each.
 
     A small part of the ground that is darker is covered. What is brighter, has soft borders and
     leaves much of a target as it is, is under glare. All else is light.
@@ -287,8 +292,8 @@ def _usual_levels(
     spread = medians(np.abs(values - usual[:, None])) * NORMAL
     width = _UNLIKE * np.maximum(np.maximum(spread, _EVEN), noise / np.exp(usual))
     dark = logs < (usual - width)[:, None, None]
-    darker = (dark[..., ::2] | dark[..., 1::2]).mean(axis=(1, 2))
-    across, along = logs[..., 1::2] - logs[..., ::2], (of_later - logs)[..., ::2]
+    darker = (dark[:, ::2] | dark[:, 1::2]).mean(axis=(1, 2))
+    across, along = logs[:, 1::2] - logs[:, ::2], (of_later - logs)[:, ::2]
     edges = (np.maximum(np.abs(across), np.abs(along)) > LIGHT_EDGE).mean(axis=(1, 2))
     light = (darker > _LIGHT) | (edges > _LIGHT)
     shade = np.where(light, 0, np.exp(usual - width) - LOG_OFFSET)
@@ -297,26 +302,6 @@ def _usual_levels(
     glare = np.where(edges > _GLARE_EDGES, _NO_GLARE, glare)
     glare = np.where(white > _WHITE_OUT, np.inf, glare)
     return shade.astype(np.float32), glare.astype(np.float32)
-
-
-def _reach(
-    shape: tuple[int, ...], frames: np.ndarray, angles: np.ndarray, radii: np.ndarray
-) -> np.ndarray:
-    """Return up to which of the radii an image shows targets at angles, shape (k, m)."""
-    reach = np.full((len(frames), len(angles)), np.inf)
-    major, _, _ = frame.ellipse_axes(frames)
-    farthest = (_PERSPECTIVE * radii[-1] * major)[:, None]
-    centres = frames[:, :2, 2] / frames[:, 2:, 2]
-    inside = (centres > farthest) & (centres < np.array(shape[1::-1]) - 1 - farthest)
-    border = np.flatnonzero(~inside.all(axis=1))
-    # The outermost circle is whole about most of them.
-    circles = frame.project(frames[border], frame.circle_points(angles, radii[-1:]))
-    whole = within(circles, shape).all(axis=(1, 2))
-    reach[border] = radii[-1]
-    border = border[~whole]
-    points = frame.project(frames[border], frame.circle_points(angles, radii))
-    reach[border] = np.where(within(points, shape), radii, 0).max(axis=2)
-    return reach
 
 
 def on_dark_ground(
@@ -337,9 +322,9 @@ def on_dark_ground(
     aside = np.maximum(SOFT_EDGE * some.blur / some.size, _ASIDE)
     step = np.exp(-_WHITE * np.log(some.contrast))[:, None].astype(np.float32)
     white = (np.maximum(gap, 0) + np.float32(LOG_OFFSET)) * step - np.float32(LOG_OFFSET)
-    ends, beyond, weight = _outlines(*some.gray.shape[1:], outer)
+    ends, beyond, weight = _outlines(*some.gray.shape[:0:-1], outer)
     votes, outermost, _ = kernels.ground_votes(
-        some.gray.swapaxes(1, 2), some.row, white, some.radii, outer + aside, beyond
+        some.gray, some.row, white, some.radii, outer + aside, beyond
     )
     ended = outermost > 0
     if not ended.any():

@@ -141,8 +141,7 @@ def best_growth(
     In the dot radii of the image; a dot that is seen with radius 1 was printed with less.
     """
     reach, plate = polar.reach[:, ::2], polar.plate[:, ::2]
-    gray = np.ascontiguousarray(polar.gray[:, ::2].swapaxes(1, 2)).swapaxes(1, 2)
-    half = replace(polar, gray=gray, reach=reach, plate=plate)
+    half = replace(polar, gray=polar.gray[..., ::2].copy(), reach=reach, plate=plate)
     every = half.repeated(len(_SHIFTS))
     tried = growth_by(np.repeat(_SHIFTS, len(polar.size)), every.size)
     edges = edge_evidence(every, 1 - tried, tried, band)

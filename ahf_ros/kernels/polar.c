@@ -1,0 +1,177 @@
+/* Polar images: gray values on circles about targets, and what they show. */
+
+#include <math.h>
+
+#include "elementary.h"
+#include "kernels.h"
+#include "robust.h"
+
+/* Points of an image, held within it: the pixel above and to the left of each, which is none of the
+   last row or column, how far beyond that it is, and how far it was outside. */
+enum { POINTS = 64 };
+typedef struct {
+    int32_t left[POINTS], top[POINTS];
+    float across[POINTS], down[POINTS], outside[POINTS];
+} places;
+
+/* The last pixel but some of a side, as far as floats know whole numbers. */
+static inline float last(count side, count but)
+{
+    count place = side > but ? side - but : 0;
+    return (float)(place < 1 << 24 ? place : 1 << 24);
+}
+
+/* Points at a radius in n directions, which a frame has made those of an image. */
+static inline void place(count h, count w, count n, const float along[3][POINTS],
+                         const float centre[3], float radius, places *at)
+{
+    float last_column = last(w, 1), last_row = last(h, 1);
+    for (count a = 0; a < n; a++) {
+        float scale = along[2][a] * radius + centre[2];
+        float column = (along[0][a] * radius + centre[0]) / scale;
+        float row = (along[1][a] * radius + centre[1]) / scale;
+        float right = lesser_f(greater_f(column, 0), last_column);
+        float low = lesser_f(greater_f(row, 0), last_row);
+        at->outside[a] = fabsf(right - column) + fabsf(low - row);
+        at->left[a] = (int32_t)lesser_f(right, last(w, 2));
+        at->top[a] = (int32_t)lesser_f(low, last(h, 2));
+        at->across[a] = right - (float)at->left[a];
+        at->down[a] = low - (float)at->top[a];
+    }
+}
+
+/* What a frame makes of the centre, and of up to POINTS directions. */
+static inline void project(count n, const double frame[3][3], const double *x, const double *y,
+                           float along[3][POINTS], float centre[3])
+{
+    for (int row = 0; row < 3; row++) {
+        centre[row] = (float)frame[row][2];
+        for (count a = 0; a < n; a++)
+            along[row][a] = (float)(frame[row][0] * x[a] + frame[row][1] * y[a]);
+    }
+}
+
+/* Gray values of an image between pixels, at m directions on r circles about k targets, the
+   innermost first; beyond the border the nearest pixel counts. The image shows all of a target, or
+   a direction of it up to a radius. */
+void circle_values(count h, count w, count k, count r, count m, const float image[h][w],
+                   const double frames[k][3][3], const double directions[2][m],
+                   const double radii[k][r], float values[k][r][m], double reach[k][m])
+{
+    places at;
+    float along[3][POINTS], centre[3], until[POINTS];
+    count right = w > 1, below = h > 1;
+    for (count b = 0; b < k; b++)
+        for (count start = 0; start < m; start += POINTS) {
+            count n = m - start < POINTS ? m - start : POINTS;
+            project(n, frames[b], &directions[0][start], &directions[1][start], along, centre);
+            for (count a = 0; a < n; a++)
+                until[a] = HUGE_VALF;
+            for (count j = 0; j < r; j++) {
+                float before = j > 0 ? (float)radii[b][j - 1] : 0;
+                place(h, w, n, along, centre, (float)radii[b][j], &at);
+                for (count a = 0; a < n; a++) {
+                    const float *upper = image[at.top[a]], *lower = image[at.top[a] + below];
+                    count left = at.left[a], next = left + right;
+                    float over = upper[left] + at.across[a] * (upper[next] - upper[left]);
+                    float under = lower[left] + at.across[a] * (lower[next] - lower[left]);
+                    values[b][j][start + a] = over + at.down[a] * (under - over);
+                }
+                for (count a = 0; a < n; a++)
+                    until[a] = at.outside[a] == 0 ? until[a] : lesser_f(until[a], before);
+            }
+            for (count a = 0; a < n; a++)
+                reach[b][start + a] = until[a];
+        }
+}
+
+/* The median size, at m points of targets, of the second difference of rows of the second difference
+   of columns. */
+void second_differences(count h, count w, count k, count m, const float image[h][w],
+                        const double frames[k][3][3], const double points[2][m], double medians[k],
+                        double scratch[m])
+{
+    static const float second[3] = {1, -2, 1};
+    places at;
+    float along[3][POINTS], centre[3];
+    for (count b = 0; b < k; b++) {
+        for (count start = 0; start < m; start += POINTS) {
+            count n = m - start < POINTS ? m - start : POINTS;
+            project(n, frames[b], &points[0][start], &points[1][start], along, centre);
+            place(h, w, n, along, centre, 1, &at);
+            for (count a = 0; a < n; a++) {
+                int64_t top = at.top[a] + (at.down[a] > 0.5f) - 1;
+                int64_t left = at.left[a] + (at.across[a] > 0.5f) - 1;
+                top = top < h - 3 ? top : h - 3;
+                left = left < w - 3 ? left : w - 3;
+                float sum = 0;
+                for (int down = 0; down < 3; down++)
+                    for (int across = 0; across < 3; across++)
+                        sum += second[down] * second[across] *
+                               image[within(top + down, h)][within(left + across, w)];
+                scratch[start + a] = fabsf(sum);
+            }
+        }
+        medians[b] = middle(m, scratch);
+    }
+}
+
+/* Gray values at r radii, of all m angles or of each, between the two circles beside them: of k
+   targets, each in one of i images of c circles from `innermost` to `outermost`. */
+void gray_at(count k, count i, count c, count m, count r, count g, const float gray[i][c][m],
+             const int64_t row[k], double innermost, const double outermost[k],
+             const double radii[k][r][g], float values[k][r][m])
+{
+    for (count b = 0; b < k; b++) {
+        double spacing = (outermost[b] - innermost) / (double)(c - 1);
+        const float(*image)[m] = gray[within(row[b], i)];
+        for (count j = 0; j < r; j++) {
+            const float *below = image[0], *above = image[0];
+            float share = 0;
+            for (count a = 0; a < m; a++) {
+                if (a == 0 || g > 1) {
+                    double place = (radii[b][j][a] - innermost) / spacing;
+                    place = greater(lesser((double)(c - 1), place), 0.0);
+                    count low = (count)place;
+                    share = (float)(place - (double)low);
+                    below = image[low];
+                    above = image[low + 1 < c ? low + 1 : low];
+                }
+                values[b][j][a] = below[a] * (1 - share) + above[a] * share;
+            }
+        }
+    }
+}
+
+/* Votes for s outlines of dark ground about bright targets: at each angle, one for each circle
+   beyond the outline that is brighter than `white`, less one for each that is darker. Circles
+   nearer than `least` do not vote. `beyond` is the number of circles beyond an outline at an angle.
+   Where the outermost circle is not brighter, which its votes tell, there are none for outlines. */
+void ground_votes(count k, count i, count c, count m, count s, const float gray[i][c][m],
+                  const int64_t row[k], const float white[k][m], const double radii[k][c],
+                  const double least[k], const int64_t beyond[s][m], int64_t votes[k][s],
+                  int64_t outermost[k], int32_t sums[c][m])
+{
+    for (count b = 0; b < k; b++) {
+        const float(*image)[m] = gray[within(row[b], i)];
+        for (count j = 0; j < c; j++) { /* from the outermost circle inwards */
+            count circle = c - 1 - j;
+            int32_t counts = radii[b][circle] >= least[b];
+            const float *here = image[circle], *bound = white[b];
+            for (count a = 0; a < m; a++) {
+                int32_t vote = (here[a] > bound[a]) - (here[a] < bound[a]);
+                sums[j][a] = (j > 0 ? sums[j - 1][a] : 0) + counts * vote;
+            }
+        }
+        outermost[b] = 0;
+        for (count a = 0; a < m; a++)
+            outermost[b] += sums[0][a];
+        for (count shape = 0; shape < s; shape++) {
+            int64_t sum = 0;
+            for (count a = 0; a < m && outermost[b] > 0; a++)
+                if (beyond[shape][a] > 0)
+                    sum += sums[within(beyond[shape][a] - 1, c)][a];
+            votes[b][shape] = sum;
+        }
+    }
+}
