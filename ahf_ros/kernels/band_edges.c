@@ -1,12 +1,79 @@
-/* What is seen of bands in polar images, as families/ring/likelihood.py compares it: gray values at
-   some radii, and the evidence of the steps between a band and the ground beside it. */
+/* What is seen of bands in polar images, as families/ring/likelihood.py compares it: the evidence of
+   the steps between a band and the ground beside it. All radii are in dot radii. */
 
 #include <math.h>
+#include <string.h>
 
 #include "elementary.h"
 #include "kernels.h"
 
 static const float NEVER_SEEN = 1e9f; /* more than any gray value, or radius */
+
+/* The circle of c below a radius, and how far that is from there to the next one. */
+static inline count circle_below(count c, double innermost, double outermost, double radius,
+                                 float *share)
+{
+    double spacing = (outermost - innermost) / (double)(c - 1);
+    double place = greater(lesser((double)(c - 1), (radius - innermost) / spacing), 0.0);
+    *share = (float)(place - (double)(count)place);
+    return (count)place;
+}
+
+/* Gray values at r radii, of all m angles or of each, between the two circles beside them: of k
+   targets, each in one of i images of c circles from `innermost` to `outermost`. */
+void gray_at(count k, count i, count c, count m, count r, count g, const float gray[i][c][m],
+             const int64_t row[k], double innermost, const double outermost[k],
+             const double radii[k][r][g], float values[k][r][m])
+{
+    for (count b = 0; b < k; b++)
+        for (count j = 0; j < r; j++) {
+            const float *below = NULL, *above = NULL;
+            float share = 0;
+            for (count a = 0; a < m; a++) {
+                if (a == 0 || g > 1) {
+                    count low = circle_below(c, innermost, outermost[b], radii[b][j][a], &share);
+                    below = gray[within(row[b], i)][low];
+                    above = gray[within(row[b], i)][low + 1 < c ? low + 1 : low];
+                }
+                values[b][j][a] = below[a] * (1 - share) + above[a] * share;
+            }
+        }
+}
+
+/* Numbers that decide, in the order of likelihood.py. */
+typedef struct {
+    double innermost, offset, white; /* circle; gray values */
+    double beside, soft, least_beside, most_beside, across[2]; /* where readings are */
+    double light_edge, least_doubt, most_doubt, marked_share;
+    double flat, flat_white, mark, tail, share, any, plain, at_ends; /* of steps of ln */
+} numbers;
+
+/* How a target looks: circle, px, gray values; what of it is drawn. */
+typedef struct {
+    double outermost, size, blur, polarity, contrast, noise, shade, glare;
+} target;
+
+/* Ink over paper, how white ink is, and how steps of ln are spread, in one target. */
+typedef struct {
+    float ink, offset, white, white_ink, glare, told_below;
+    float flat, of_white, mark, tail, share, noise, plain, any, doubt, at_ends;
+} look;
+
+static inline look look_of(const numbers *of, const target *it, float doubt)
+{
+    bool dark = it->polarity > 0;
+    float contrast = (float)it->contrast, white = (float)of->white;
+    /* White paper may be ink under glare, but white ink on dark ground is ink. */
+    return (look){.ink = dark ? contrast : 1 / contrast, .offset = (float)of->offset,
+                  .white = white, .white_ink = dark ? NEVER_SEEN : white,
+                  .glare = (float)it->glare,
+                  .told_below = !dark || it->glare > NEVER_SEEN ? NEVER_SEEN : white,
+                  .flat = (float)of->flat,
+                  .of_white = (float)(it->glare <= of->white ? of->flat_white : of->flat),
+                  .mark = (float)of->mark, .tail = (float)of->tail, .share = (float)of->share,
+                  .noise = (float)it->noise, .plain = (float)of->plain, .any = (float)of->any,
+                  .doubt = doubt, .at_ends = greater_f(doubt, (float)of->at_ends)};
+}
 
 /* Share of ink at a distance from the edge that blur made of it, in deviations. */
 static inline double blurred(double distance)
@@ -14,41 +81,76 @@ static inline double blurred(double distance)
     return distance > 6 ? 1 : distance < -6 ? 0 : normal_share(distance);
 }
 
-/* Shares of ink that blur leaves or brings at radii, of a bare band and of a marked one: ink of the
-   dot, white paper beyond a plate, which is as white ink, and the band. All in dot radii. */
-void ink_shares(count k, count r, count g, count m, const double radii[k][r][g],
-                const double plate[k][m], const double dot[k], const double inner[k],
-                const double outer[k], const double blur[k], float bare[k][r][m],
-                float marked[k][r][m])
+/* What is read at an edge of a band, on ground and on the band: gray values; shares of ink that
+   blur leaves or brings there, of a bare band and of a marked one; and what readings count. */
+enum { GROUND, BAND, BARE, MARKED, BARE_BAND, MARKED_BAND, COUNTS, READ };
+
+/* Shares of ink at a radius: of the dot, and of the band. */
+static inline void ink_at(const double edges[3], double blur, double at, double *dot, double *band)
 {
-    for (count b = 0; b < k; b++)
-        for (count j = 0; j < r; j++) {
-            double of_dot = 0, of_band = 0;
-            for (count a = 0; a < m; a++) {
-                double at = radii[b][j][g == 1 ? 0 : a];
-                if (a == 0 || g > 1) {
-                    of_dot = blurred((dot[b] - at) / blur[b]);
-                    of_band = blurred((outer[b] - at) / blur[b]) -
-                              blurred((inner[b] - at) / blur[b]);
-                }
-                double beyond = plate[b][a] < NEVER_SEEN ? 1 - blurred((plate[b][a] - at) / blur[b])
-                                                  : 0;
-                bare[b][j][a] = (float)(of_dot + beyond);
-                marked[b][j][a] = (float)(of_dot + beyond + of_band);
-            }
-        }
+    *dot = blurred((edges[0] - at) / blur);
+    *band = blurred((edges[2] - at) / blur) - blurred((edges[1] - at) / blur);
 }
 
-/* How ink and light look in one target, and how steps of ln are spread. */
-typedef struct {
-    float ink, offset, white, white_ink, glare; /* ink over paper; gray values */
-    float flat, of_white, mark, tail, share, noise, plain, any;
-} look;
-
-static inline look ink_of(float contrast, bool dark, float white, float offset)
+/* Where a plate ends, its ground is read in the middle of the rim. */
+static inline double on_ground(double radius, double plate, double outer)
 {
-    return (look){.ink = dark ? contrast : 1 / contrast, .offset = offset, .white = white,
-                  .white_ink = dark ? NEVER_SEEN : white};
+    return plate < NEVER_SEEN ? lesser(radius, (plate + outer) / 2) : radius;
+}
+
+/* Read a circle, or where plates end, on ground, one in the middle of their rim: ink of the dot,
+   white paper beyond a plate, which is as white ink, and the band. */
+static void read_ring(count c, count m, const float image[c][m], const numbers *of,
+                      const target *it, const double edges[3], const double plate[m], double radius,
+                      bool ground, float *restrict gray, float *restrict bare,
+                      float *restrict marked)
+{
+    double blur = it->blur / it->size, dot, band;
+    float share;
+    count low = circle_below(c, of->innermost, it->outermost, radius, &share);
+    const float *below = image[low], *above = image[low + 1 < c ? low + 1 : low];
+    ink_at(edges, blur, radius, &dot, &band);
+    for (count a = 0; a < m; a++) {
+        gray[a] = below[a] * (1 - share) + above[a] * share;
+        bare[a] = (float)dot;
+        marked[a] = (float)(dot + band);
+    }
+    for (count a = 0; a < m; a++) {
+        if (!(plate[a] < NEVER_SEEN))
+            continue;
+        double at = ground ? on_ground(radius, plate[a], edges[2]) : radius;
+        double beyond = 1 - blurred((plate[a] - at) / blur);
+        low = circle_below(c, of->innermost, it->outermost, at, &share);
+        ink_at(edges, blur, at, &dot, &band);
+        gray[a] = image[low][a] * (1 - share) + image[low + 1 < c ? low + 1 : low][a] * share;
+        bare[a] = (float)(dot + beyond);
+        marked[a] = (float)(dot + beyond + band);
+    }
+}
+
+/* Read both edges of a band, with radii of dot, inner and outer edge. */
+static void read_edges(count c, count m, const float image[c][m], const numbers *of,
+                       const target *it, const double edges[3], const double reach[m],
+                       const double plate[m], float weight, float read[2][READ][m])
+{
+    double beside = (of->beside + greater(it->blur - of->soft, 0)) / it->size;
+    beside = lesser(greater(beside, of->least_beside), of->most_beside);
+    double before = lesser(beside, 0.5 * (edges[1] - edges[0]));
+    double within = lesser(beside, 0.45 * (edges[2] - edges[1]));
+    double ground[2] = {edges[1] - before, edges[2] + beside};
+    double band[2] = {edges[1] + within, edges[2] - within};
+    for (int side = 0; side < 2; side++) {
+        float(*at)[m] = read[side];
+        read_ring(c, m, image, of, it, edges, plate, ground[side], side == 1, at[GROUND], at[BARE],
+                  at[MARKED]);
+        read_ring(c, m, image, of, it, edges, plate, band[side], false, at[BAND], at[BARE_BAND],
+                  at[MARKED_BAND]);
+        for (count a = 0; a < m; a++) {
+            double far = side ? on_ground(ground[1], plate[a], edges[2]) : band[0];
+            bool visible = reach[a] >= greater(far, band[side]) && (!side || plate[a] > edges[2]);
+            at[COUNTS][a] = visible ? weight : 0;
+        }
+    }
 }
 
 /* Gray value of paper of which a share is ink, where ground of which another share is ink is seen.
@@ -63,40 +165,31 @@ static inline float printed(look of, float ground, float of_ground, float share,
 
 static inline float raised(look of, float gray) { return greater_f(gray, 0) + of.offset; }
 
-/* Densities of a step of ln, as paper makes it, as ink does, and as anything; the step of ink, and
-   what the errors of both are. */
-typedef struct {
-    float paper, ink, anything, mark, spread, low, high, known;
-} step;
-
-static inline step compared(look of, float beside, float lower, float here, float bare,
-                            float marked, float bare_here, float marked_here)
+/* Probability of an edge of light between neighbours, as two circles in the gap show it. */
+static double light_edges(count c, count m, const float image[c][m], const numbers *of,
+                          const target *it, const double edges[3])
 {
-    step it;
-    float gray_ink = printed(of, beside, marked, marked_here, here);
-    float level = raised(of, here), below = raised(of, beside), ink = raised(of, gray_ink);
-    float blank = raised(of, printed(of, beside, bare, bare_here, here));
-    it.mark = logarithm_f(ink / below);
-    float flat = lower >= of.white ? of.of_white : of.flat;
-    float of_noise = of.noise / level, of_ground = of.noise / below;
-    it.spread = sqrtf(flat * flat + of_noise * of_noise + of_ground * of_ground);
-    it.paper = normal_density_f(logarithm_f(level / blank), it.spread);
-    it.anything = of.plain * it.paper + (1 - of.plain) * of.any;
-    float of_ink = of_ground * (gray_ink / greater_f(beside, 1)) * (below / ink);
-    it.known = of_noise * of_noise + of_ink * of_ink;
-    it.low = sqrtf(of.mark * of.mark + it.known);
-    it.high = sqrtf(of.tail * of.tail + it.known);
-    float more = logarithm_f(level / ink);
-    more = it.mark < 0 ? -more : more;
-    float width = more > 0 ? it.high : it.low;
-    it.ink = normal_density_f(more, width) * (2 * width / (it.low + it.high));
-    /* Glare makes the step of a mark smaller. */
-    float size = fabsf(it.mark), under_glare = 1 / greater_f(size, of.flat);
-    under_glare = beside >= of.glare ? under_glare : 0;
-    under_glare = more < 0 ? under_glare : 0;
-    under_glare = more > -size ? under_glare : 0;
-    it.ink = greater_f(it.ink, under_glare);
-    return it;
+    const float *below[2], *above[2];
+    float share[2];
+    for (int side = 0; side < 2; side++) {
+        double at = edges[0] + (edges[1] - edges[0]) * of->across[side];
+        count low = circle_below(c, of->innermost, it->outermost, at, &share[side]);
+        below[side] = image[low];
+        above[side] = image[low + 1 < c ? low + 1 : low];
+    }
+    float least = (float)(of->light_edge * of->light_edge), offset = (float)of->offset;
+    float noise = (float)it->noise, edge_count = 0;
+    for (count a = 0; a < m; a++) {
+        float first = below[0][a] * (1 - share[0]) + above[0][a] * share[0];
+        float second = below[1][a] * (1 - share[1]) + above[1][a] * share[1];
+        first = greater_f(first, 0) + offset;
+        second = greater_f(second, 0) + offset;
+        float step = logarithm_f(first / second);
+        float of_first = noise / first, of_second = noise / second;
+        float noisy = least + 4 * (of_first * of_first + of_second * of_second);
+        edge_count += step * step > noisy ? 1.0f : 0.0f;
+    }
+    return lesser(greater(edge_count / (double)m, of->least_doubt), of->most_doubt);
 }
 
 /* Log odds of a density, unless light that nothing predicts is there. */
@@ -105,126 +198,198 @@ static inline float log_odds(look of, float density, float doubt, float anything
     return logarithm_f(((1 - doubt) * density + doubt * of.any) / anything);
 }
 
-/* Log odds of paper and of ink at one edge of one band. No array is another one, so that a compiler
-   can take several angles at a time. */
-static void paper_and_ink(count m, look of, float doubt, float told_below,
-                          const float *restrict beside, const float *restrict inner,
-                          const float *restrict outer, const float *restrict here,
-                          const float *restrict bare, const float *restrict marked,
-                          const float *restrict bare_here, const float *restrict marked_here,
-                          const float *restrict told, float *restrict paper, float *restrict ink)
+/* How steps of ln at an edge are spread: density of anything; the step of a mark; deviation of
+   paper, and mean one of ink; variance of noise; the darker one of the ground on both sides; and what
+   readings count that tell anything. */
+enum { ANYTHING, MARK, SPREAD, WIDTH, KNOWN, LOWER, TOLD, STEPS };
+
+/* Log odds of paper and of ink, against anything, from the steps of ln between the ground beside an
+   edge, of which `lower` is the darker one of both, and the band there. Where glare makes the ground
+   on both sides white, paper between is white. No array is another one, so that a compiler can take
+   several angles at a time. */
+static void paper_and_ink(count m, look of, const float *restrict lower, const float *restrict beside,
+                          const float *restrict here, const float *restrict bare,
+                          const float *restrict marked, const float *restrict bare_here,
+                          const float *restrict marked_here, const float *restrict counts,
+                          float *restrict anything, float *restrict mark, float *restrict spread,
+                          float *restrict mean_width, float *restrict known, float *restrict paper,
+                          float *restrict ink)
 {
     for (count a = 0; a < m; a++) {
-        step it = compared(of, beside[a], lesser_f(inner[a], outer[a]), here[a], bare[a], marked[a],
-                           bare_here[a], marked_here[a]);
-        float weight = told[a];
-        weight = here[a] < told_below ? weight : 0;
-        paper[a] = weight * log_odds(of, it.paper, doubt, it.anything);
-        ink[a] = weight * log_odds(of, it.ink, doubt, it.anything);
+        float gray_ink = printed(of, beside[a], marked[a], marked_here[a], here[a]);
+        float level = raised(of, here[a]), below = raised(of, beside[a]);
+        float of_ink = raised(of, gray_ink);
+        float blank = raised(of, printed(of, beside[a], bare[a], bare_here[a], here[a]));
+        float step = logarithm_f(of_ink / below);
+        float flat = lower[a] >= of.white ? of.of_white : of.flat;
+        float of_noise = of.noise / level, of_ground = of.noise / below;
+        spread[a] = sqrtf(flat * flat + of_noise * of_noise + of_ground * of_ground);
+        float as_paper = normal_density_f(logarithm_f(level / blank), spread[a]);
+        anything[a] = of.plain * as_paper + (1 - of.plain) * of.any;
+        float ink_ground = of_ground * (gray_ink / greater_f(beside[a], 1)) * (below / of_ink);
+        known[a] = of_noise * of_noise + ink_ground * ink_ground;
+        float low = sqrtf(of.mark * of.mark + known[a]);
+        float high = sqrtf(of.tail * of.tail + known[a]);
+        float more = logarithm_f(level / of_ink);
+        more = step < 0 ? -more : more;
+        float width = more > 0 ? high : low;
+        float as_ink = normal_density_f(more, width) * (2 * width / (low + high));
+        /* Glare makes the step of a mark smaller. */
+        float size = fabsf(step), under_glare = 1 / greater_f(size, of.flat);
+        under_glare = beside[a] >= of.glare ? under_glare : 0;
+        under_glare = more < 0 ? under_glare : 0;
+        under_glare = more > -size ? under_glare : 0;
+        as_ink = greater_f(as_ink, under_glare);
+        mark[a] = step;
+        mean_width[a] = (low + high) / 2;
+        paper[a] = counts[a] * log_odds(of, as_paper, of.doubt, anything[a]);
+        ink[a] = counts[a] * log_odds(of, as_ink, of.doubt, anything[a]);
     }
 }
 
-/* Log odds of paper, of shares of ink and of ink in bands against anything, from the steps of ln
-   between the ground beside either edge and the band there: [0] at the inner edge, [1] at the outer
-   one. `typical` is what paper and ink give on average if they look as they should, in bands that
-   are compared with shares of ink between.
-
-   Where glare makes the ground on both sides white, paper between is white. White paper may be ink
-   under glare, but white ink on dark ground is ink. */
-void step_evidence(count k, count m, count n, const float ground[k][2][m],
-                   const float band[k][2][m], const float bare_ground[k][2][m],
-                   const float marked_ground[k][2][m], const float bare_band[k][2][m],
-                   const float marked_band[k][2][m], const float counts[k][2][m],
-                   const float shares[n], const float contrast[k], const bool dark[k],
-                   const float noise[k], const float glare[k], const float lit[k], float offset,
-                   float white, float flat, float flat_white, float mark, float tail, float share,
-                   float any, float plain, float at_ends, float looks[k][2][n][m],
-                   float typical[k][2][2][m])
+/* The same of a share of ink between paper and ink. */
+static void mixed_ink(count m, look of, float share, const float *restrict beside,
+                      const float *restrict here, const float *restrict bare,
+                      const float *restrict marked, const float *restrict bare_here,
+                      const float *restrict marked_here, const float *restrict counts,
+                      const float *restrict anything, const float *restrict mark,
+                      const float *restrict known, float *restrict odds)
 {
-    for (count b = 0; b < k; b++) {
-        look of = ink_of(contrast[b], dark[b], white, offset);
-        of.glare = glare[b];
-        of.flat = flat;
-        of.of_white = glare[b] <= white ? flat_white : flat;
-        of.mark = mark;
-        of.tail = tail;
-        of.share = share;
-        of.noise = noise[b];
-        of.plain = plain;
-        of.any = any;
-        float told_below = !dark[b] || glare[b] > NEVER_SEEN ? NEVER_SEEN : white, doubt = lit[b];
-        float at_edge = doubt * logarithm_f(doubt / (1 - plain));
-        float at_end = greater_f(doubt, at_ends);
-        for (count side = 0; side < 2; side++) {
-            const float *here = band[b][side], *beside = ground[b][side], *told = counts[b][side];
-            const float *bare = bare_ground[b][side], *marked = marked_ground[b][side];
-            const float *bare_here = bare_band[b][side], *marked_here = marked_band[b][side];
-            const float *inner = ground[b][0], *outer = ground[b][1];
-            paper_and_ink(m, of, doubt, told_below, beside, inner, outer, here, bare, marked,
-                          bare_here, marked_here, told, looks[b][side][0], looks[b][side][n - 1]);
-            for (count a = 0; a < m && n == 2; a++)
-                typical[b][side][0][a] = typical[b][side][1][a] = 0;
-            for (count a = 0; a < m && n > 2; a++) {
-                step it = compared(of, beside[a], lesser_f(inner[a], outer[a]), here[a], bare[a],
-                                   marked[a], bare_here[a], marked_here[a]);
-                float weight = here[a] < told_below ? told[a] : 0, of_share = of.share * it.mark;
-                float width = sqrtf(of.mark * of.mark + of_share * of_share + it.known);
-                for (count s = 1; s < n - 1; s++) {
-                    float on_ground = bare[a] + shares[s] * (marked[a] - bare[a]);
-                    float on_band = bare_here[a] + shares[s] * (marked_here[a] - bare_here[a]);
-                    float mixed = raised(of, printed(of, beside[a], on_ground, on_band, here[a]));
-                    float density =
-                        normal_density_f(logarithm_f(raised(of, here[a]) / mixed), width);
-                    looks[b][side][s][a] = weight * log_odds(of, density, at_end, it.anything);
-                }
-                float paper = normal_density_f(0, it.spread);
-                float ink = normal_density_f(0, (it.low + it.high) / 2);
-                float as_paper = plain * paper + (1 - plain) * any;
-                float as_ink = plain * normal_density_f(it.mark, it.spread) + (1 - plain) * any;
-                typical[b][side][0][a] =
-                    weight * ((1 - doubt) * log_odds(of, paper, doubt, as_paper) + at_edge);
-                typical[b][side][1][a] =
-                    weight * ((1 - doubt) * log_odds(of, ink, doubt, as_ink) + at_edge);
-            }
-        }
+    for (count a = 0; a < m; a++) {
+        float on_ground = bare[a] + share * (marked[a] - bare[a]);
+        float on_band = bare_here[a] + share * (marked_here[a] - bare_here[a]);
+        float mixed = raised(of, printed(of, beside[a], on_ground, on_band, here[a]));
+        float of_share = of.share * mark[a];
+        float width = sqrtf(of.mark * of.mark + of_share * of_share + known[a]);
+        float density = normal_density_f(logarithm_f(raised(of, here[a]) / mixed), width);
+        odds[a] = counts[a] * log_odds(of, density, of.at_ends, anything[a]);
     }
 }
 
-/* Where something covers the ground beside either edge of bands, which is no shadow: marks in
-   shadow are darker than those in the light, and nothing that covers a target is. `lit` is the
-   ground as paper, and `inked` what ink in the shade would be where each reading is seen. */
-void covered_ground(count k, count m, const float ground[k][2][m], const float band[k][2][m],
-                    const float lit[k][2][m], const bool marked[k][2][m],
-                    const bool visible[k][2][m], const float shade[k], const float contrast[k],
-                    const bool dark[k], float offset, float white, float light_edge,
-                    float marked_share, bool covered[k][2][m])
+/* What paper and ink give on average if they look as they should. */
+static void as_they_should(count m, look of, const float *restrict counts,
+                           const float *restrict mark, const float *restrict spread,
+                           const float *restrict width, float *restrict paper,
+                           float *restrict ink)
 {
-    for (count b = 0; b < k; b++) {
-        look of = ink_of(contrast[b], dark[b], white, offset);
-        count every = 0, in_shadow = 0;
-        for (count side = 0; side < 2; side++)
-            for (count a = 0; a < m; a++) {
-                float here = band[b][side][a];
-                bool dim = visible[b][side][a] && lit[b][side][a] <= shade[b];
-                covered[b][side][a] = dim;
-                every += dim;
-                in_shadow += dim && marked[b][side][a] && here < printed(of, shade[b], 0, 1, here);
-            }
-        bool shadow = (float)in_shadow > marked_share * (float)every;
+    float at_edge = of.doubt * logarithm_f(of.doubt / (1 - of.plain));
+    for (count a = 0; a < m; a++) {
+        float as_paper = normal_density_f(0, spread[a]), as_ink = normal_density_f(0, width[a]);
+        float any = (1 - of.plain) * of.any, flat = of.plain * as_paper + any;
+        float step = of.plain * normal_density_f(mark[a], spread[a]) + any;
+        float of_paper = (1 - of.doubt) * log_odds(of, as_paper, of.doubt, flat) + at_edge;
+        float of_ink = (1 - of.doubt) * log_odds(of, as_ink, of.doubt, step) + at_edge;
+        paper[a] = counts[a] * of_paper;
+        ink[a] = counts[a] * of_ink;
+    }
+}
+
+/* Log odds of paper, [0], of shares of ink between and of ink, [n - 1], at one edge of a band. */
+static void step_odds(count m, count n, look of, const float shares[n], float read[2][READ][m],
+                      int side, float steps[STEPS][m], float looks[n][m])
+{
+    float(*at)[m] = read[side];
+    for (count a = 0; a < m; a++) {
+        float counts = at[COUNTS][a];
+        steps[LOWER][a] = lesser_f(read[0][GROUND][a], read[1][GROUND][a]);
+        steps[TOLD][a] = at[BAND][a] < of.told_below ? counts : 0;
+    }
+    paper_and_ink(m, of, steps[LOWER], at[GROUND], at[BAND], at[BARE], at[MARKED], at[BARE_BAND],
+                  at[MARKED_BAND], steps[TOLD], steps[ANYTHING], steps[MARK], steps[SPREAD],
+                  steps[WIDTH], steps[KNOWN], looks[0], looks[n - 1]);
+    for (count s = 1; s < n - 1; s++)
+        mixed_ink(m, of, shares[s], at[GROUND], at[BAND], at[BARE], at[MARKED], at[BARE_BAND],
+                  at[MARKED_BAND], steps[TOLD], steps[ANYTHING], steps[MARK], steps[KNOWN], looks[s]);
+}
+
+/* Where something covers the ground beside either edge of a band, which is no shadow: marks in
+   shadow are darker than those in the light, and nothing that covers a target is. */
+static void covered_ground(count m, count n, look of, float shade, float light_edge,
+                           float marked_share, float read[2][READ][m], float looks[2][n][m],
+                           float lit[2][m], bool covered[2][m])
+{
+    count every = 0, in_shadow = 0; /* and `lit`, ground as paper */
+    for (int side = 0; side < 2; side++)
         for (count a = 0; a < m; a++) {
-            bool ground_as_ink[2], across = true, dim[2];
-            for (count side = 0; side < 2; side++) {
-                dim[side] = covered[b][side][a] && !shadow;
-                float as_ink = logarithm_f(raised(of, printed(of, shade[b], 0, 1, lit[b][side][a])));
-                float of_ground = logarithm_f(raised(of, ground[b][side][a]));
-                float of_band = logarithm_f(raised(of, band[b][side][a]));
-                ground_as_ink[side] = fabsf(of_ground - as_ink) < light_edge;
-                across &= fabsf(of_band - as_ink) < light_edge;
-            }
-            /* The border of what is as dark as ink looks like the edge of a mark. */
-            for (count side = 0; side < 2; side++)
-                covered[b][side][a] =
-                    dim[side] || (dim[1 - side] && ground_as_ink[1 - side] && across);
+            float ground = read[side][GROUND][a], here = read[side][BAND][a];
+            lit[side][a] = greater_f(ground, ground / (1 + read[side][MARKED][a] * (of.ink - 1)));
+            bool dim = read[side][COUNTS][a] > 0 && lit[side][a] <= shade;
+            covered[side][a] = dim;
+            every += dim;
+            in_shadow += dim && looks[side][n - 1][a] > looks[side][0][a] &&
+                         here < printed(of, shade, 0, 1, here);
         }
+    bool shadow = (float)in_shadow > marked_share * (float)every;
+    for (count a = 0; a < m; a++) {
+        bool ground_as_ink[2], across = true, dim[2];
+        if (!covered[0][a] && !covered[1][a])
+            continue;
+        for (int side = 0; side < 2; side++) {
+            dim[side] = covered[side][a] && !shadow;
+            float as_ink = logarithm_f(raised(of, printed(of, shade, 0, 1, lit[side][a])));
+            float of_ground = logarithm_f(raised(of, read[side][GROUND][a]));
+            float of_band = logarithm_f(raised(of, read[side][BAND][a]));
+            ground_as_ink[side] = fabsf(of_ground - as_ink) < light_edge;
+            across &= fabsf(of_band - as_ink) < light_edge;
+        }
+        /* The border of what is as dark as ink looks like the edge of a mark. */
+        for (int side = 0; side < 2; side++)
+            covered[side][a] = dim[side] || (dim[1 - side] && ground_as_ink[1 - side] && across);
     }
+}
+
+/* Log odds of paper, of shares of ink and of ink in bands against anything, [0] at the inner edge
+   and [1] at the outer one, of k targets that are each in one of i images of c circles; what paper
+   and ink give on average; and where something covers the ground. `lit` is the probability of an
+   edge of light between neighbours. */
+void edge_evidence(count k, count i, count c, count m, count n, const float gray[i][c][m],
+                   const int64_t row[k], const double reach[k][m], const double plate[k][m],
+                   const double looks_of[k][8], const double edges[k][3], const float weight[k],
+                   const float shares[n], const double deciding[21], float looks[k][2][n][m],
+                   float typical[k][2][2][m], bool covered[k][2][m], float lit[k],
+                   float read[2][7][m], float steps[7][m])
+{
+    numbers of;
+    target it;
+    memcpy(&of, deciding, sizeof of);
+    for (count b = 0; b < k; b++) {
+        const float(*image)[m] = gray[within(row[b], i)];
+        memcpy(&it, looks_of[b], sizeof it);
+        lit[b] = (float)light_edges(c, m, image, &of, &it, edges[b]);
+        look seen = look_of(&of, &it, lit[b]);
+        read_edges(c, m, image, &of, &it, edges[b], reach[b], plate[b], weight[b], read);
+        for (int side = 0; side < 2; side++) {
+            step_odds(m, n, seen, shares, read, side, steps, looks[b][side]);
+            as_they_should(m, seen, steps[TOLD], steps[MARK], steps[SPREAD], steps[WIDTH],
+                           typical[b][side][0], typical[b][side][1]);
+        }
+        covered_ground(m, n, seen, (float)it.shade, (float)of.light_edge, (float)of.marked_share,
+                       read, looks[b], steps, covered[b]);
+    }
+}
+
+/* The same of paper and of ink at s places of edges, both edges together. */
+void shifted_evidence(count k, count i, count c, count m, count s, const float gray[i][c][m],
+                      const int64_t row[k], const double reach[k][m], const double plate[k][m],
+                      const double looks_of[k][8], const double edges[k][s][3],
+                      const float weight[k], const double deciding[21], float looks[k][s][2][m],
+                      float read[2][7][m], float steps[7][m], float of_edges[2][2][m])
+{
+    static const float shares[2] = {0, 1};
+    numbers of;
+    target it;
+    memcpy(&of, deciding, sizeof of);
+    for (count b = 0; b < k; b++)
+        for (count shift = 0; shift < s; shift++) {
+            const float(*image)[m] = gray[within(row[b], i)];
+            const double *at = edges[b][shift];
+            memcpy(&it, looks_of[b], sizeof it);
+            look seen = look_of(&of, &it, (float)light_edges(c, m, image, &of, &it, at));
+            read_edges(c, m, image, &of, &it, at, reach[b], plate[b], weight[b], read);
+            for (int side = 0; side < 2; side++)
+                step_odds(m, 2, seen, shares, read, side, steps, of_edges[side]);
+            for (int ink = 0; ink < 2; ink++)
+                for (count a = 0; a < m; a++)
+                    looks[b][shift][ink][a] = of_edges[0][ink][a] + of_edges[1][ink][a];
+        }
 }

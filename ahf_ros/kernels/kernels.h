@@ -34,9 +34,6 @@ void circle_values(count h, count w, count k, count r, count m, const float imag
 void second_differences(count h, count w, count k, count m, const float image[h][w],
                         const double frames[k][3][3], const double points[2][m], double medians[k],
                         double scratch[m]);
-void gray_at(count k, count i, count c, count m, count r, count g, const float gray[i][c][m],
-             const int64_t row[k], double innermost, const double outermost[k],
-             const double radii[k][r][g], float values[k][r][m]);
 void ground_votes(count k, count i, count c, count m, count s, const float gray[i][c][m],
                   const int64_t row[k], const float white[k][m], const double radii[k][c],
                   const double least[k], const int64_t beyond[s][m], int64_t votes[k][s],
@@ -44,24 +41,31 @@ void ground_votes(count k, count i, count c, count m, count s, const float gray[
 
 /* band_edges.c */
 
-void ink_shares(count k, count r, count g, count m, const double radii[k][r][g],
-                const double plate[k][m], const double dot[k], const double inner[k],
-                const double outer[k], const double blur[k], float bare[k][r][m],
-                float marked[k][r][m]);
-void step_evidence(count k, count m, count n, const float ground[k][2][m],
-                   const float band[k][2][m], const float bare_ground[k][2][m],
-                   const float marked_ground[k][2][m], const float bare_band[k][2][m],
-                   const float marked_band[k][2][m], const float counts[k][2][m],
-                   const float shares[n], const float contrast[k], const bool dark[k],
-                   const float noise[k], const float glare[k], const float lit[k], float offset,
-                   float white, float flat, float flat_white, float mark, float tail, float share,
-                   float any, float plain, float at_ends, float looks[k][2][n][m],
-                   float typical[k][2][2][m]);
-void covered_ground(count k, count m, const float ground[k][2][m], const float band[k][2][m],
-                    const float lit[k][2][m], const bool marked[k][2][m],
-                    const bool visible[k][2][m], const float shade[k], const float contrast[k],
-                    const bool dark[k], float offset, float white, float light_edge,
-                    float marked_share, bool covered[k][2][m]);
+void gray_at(count k, count i, count c, count m, count r, count g, const float gray[i][c][m],
+             const int64_t row[k], double innermost, const double outermost[k],
+             const double radii[k][r][g], float values[k][r][m]);
+void edge_evidence(count k, count i, count c, count m, count n, const float gray[i][c][m],
+                   const int64_t row[k], const double reach[k][m], const double plate[k][m],
+                   const double looks_of[k][8], const double edges[k][3], const float weight[k],
+                   const float shares[n], const double deciding[21], float looks[k][2][n][m],
+                   float typical[k][2][2][m], bool covered[k][2][m], float lit[k],
+                   float read[2][7][m], float steps[7][m]);
+void shifted_evidence(count k, count i, count c, count m, count s, const float gray[i][c][m],
+                      const int64_t row[k], const double reach[k][m], const double plate[k][m],
+                      const double looks_of[k][8], const double edges[k][s][3],
+                      const float weight[k], const double deciding[21], float looks[k][s][2][m],
+                      float read[2][7][m], float steps[7][m], float of_edges[2][2][m]);
+
+/* appearance.c */
+
+void unlike_shares(count k, count i, count c, count m, count n, const float gray[i][c][m],
+                   const int64_t row[k], const double light[k][3], const double step[k],
+                   const double radii[c], const bool clear[c], const double reach[k][m],
+                   const double directions[2][m], const int64_t words[k], const int64_t phases[k],
+                   const int64_t longer[2][k], const double kinds[k][4][2], double offset,
+                   double even, double uneven, double inmost, double deeper, double unlike,
+                   int64_t readings, double of_marks, double shares[k], float steps[c][m],
+                   bool told[3][m], bool odd[2][m], int64_t counts[2][m], double most[n]);
 
 /* bands.c */
 

@@ -116,33 +116,6 @@ void second_differences(count h, count w, count k, count m, const float image[h]
     }
 }
 
-/* Gray values at r radii, of all m angles or of each, between the two circles beside them: of k
-   targets, each in one of i images of c circles from `innermost` to `outermost`. */
-void gray_at(count k, count i, count c, count m, count r, count g, const float gray[i][c][m],
-             const int64_t row[k], double innermost, const double outermost[k],
-             const double radii[k][r][g], float values[k][r][m])
-{
-    for (count b = 0; b < k; b++) {
-        double spacing = (outermost[b] - innermost) / (double)(c - 1);
-        const float(*image)[m] = gray[within(row[b], i)];
-        for (count j = 0; j < r; j++) {
-            const float *below = image[0], *above = image[0];
-            float share = 0;
-            for (count a = 0; a < m; a++) {
-                if (a == 0 || g > 1) {
-                    double place = (radii[b][j][a] - innermost) / spacing;
-                    place = greater(lesser((double)(c - 1), place), 0.0);
-                    count low = (count)place;
-                    share = (float)(place - (double)low);
-                    below = image[low];
-                    above = image[low + 1 < c ? low + 1 : low];
-                }
-                values[b][j][a] = below[a] * (1 - share) + above[a] * share;
-            }
-        }
-    }
-}
-
 /* Votes for s outlines of dark ground about bright targets: at each angle, one for each circle
    beyond the outline that is brighter than `white`, less one for each that is darker. Circles
    nearer than `least` do not vote. `beyond` is the number of circles beyond an outline at an angle.

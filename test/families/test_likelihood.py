@@ -11,7 +11,6 @@ from ahf_ros.families.ring.likelihood import (
     band_edges,
     edge_evidence,
     level_evidence,
-    light_edges,
     weights,
 )
 from ahf_ros.families.ring.polar import PolarImages
@@ -151,9 +150,8 @@ def test_readings_of_neighbours_that_are_alike_share_one_weight() -> None:
 def test_gaps_tell_how_often_light_has_edges() -> None:
     calm, restless = polar(), polar()
     restless.gray[:, RADII > 1.6, ::3] *= 0.3
-    inner = np.array([BAND[0]])
-    assert light_edges(calm, ONE, NONE, inner).tolist() == [0.05]
-    assert light_edges(restless, ONE, NONE, inner)[0] == pytest.approx(1 / 3, abs=0.02)
+    assert edges(calm).lit[0] == pytest.approx(0.05)
+    assert edges(restless).lit[0] == pytest.approx(1 / 3, abs=0.02)
     assert (edges(restless).ink[0, :, 1] < edges(calm).ink[0, :, 1]).all()
 
 

@@ -1,7 +1,10 @@
 """What is seen of bands, against the formulas of one reading."""
 
+from __future__ import annotations
+
 import itertools
 import math
+from dataclasses import dataclass
 
 import numpy as np
 import pytest
@@ -50,49 +53,94 @@ def test_readings_lie_between_two_circles(seed: int) -> None:
             assert values[b, j, a] == pytest.approx(expected, rel=1e-5)
 
 
-@pytest.mark.parametrize('seed', range(6))
-def test_shares_of_ink_are_those_that_blur_makes(seed: int) -> None:
-    generator = np.random.default_rng(seed)
-    k, r, m = 2, 2, 4
-    plate = np.where(generator.random((k, m)) < 0.5, np.inf, generator.uniform(3, 5, (k, m)))
-    dot, inner, outer = np.ones(k), np.full(k, 2.0), np.full(k, 3.0)
-    blur = generator.uniform(0.05, 0.5, k)
-    for g in (1, m):
-        radii = generator.uniform(0.5, 4, (k, r, g))
-        bare, marked = kernels.ink_shares(radii, plate, dot, inner, outer, blur)
-        for b, j, a in itertools.product(range(k), range(r), range(m)):
-            at = radii[b, j, a % g]
-            beyond = 1 - share((plate[b, a] - at) / blur[b])
-            rest = share((dot[b] - at) / blur[b]) + beyond
-            band = share((outer[b] - at) / blur[b]) - share((inner[b] - at) / blur[b])
-            assert bare[b, j, a] == pytest.approx(rest, abs=1e-6)
-            assert marked[b, j, a] == pytest.approx(rest + band, abs=1e-6)
+# In the order of the C file.
+LIMITS = {
+    **{'innermost': 0.3, 'offset': OFFSET, 'white': WHITE},
+    **{'beside': 2.6, 'soft': 1.0, 'least': 0.13, 'most': 0.36, 'first': 0.3, 'second': 0.75},
+    **{'edge': 0.3, 'least doubt': 0.05, 'most doubt': 0.5, 'marked': 0.2},
+    **{'flat': FLAT, 'flat white': FLAT_WHITE, 'mark': MARK, 'tail': TAIL, 'share': SHARE},
+    **{'any': ANY, 'plain': PLAIN, 'at ends': AT_ENDS},
+}
+DECIDING = np.array(list(LIMITS.values()))
+OUTERMOST, CIRCLES, ANGLES = 4.0, 30, 8
+CIRCLE_RADII = np.linspace(0.3, OUTERMOST, CIRCLES)
 
 
-@pytest.mark.parametrize('shares', [(), (0.25, 0.5, 0.75)])
-@pytest.mark.parametrize('seed', range(6))
-def test_steps_are_compared_by_their_densities(seed: int, shares: tuple[float, ...]) -> None:
-    generator = np.random.default_rng(seed)
-    k, m = 3, 6
-    ground, band = generator.uniform(0, 260, (2, k, 2, m)).astype(np.float32)
-    parts = generator.uniform(0, 1, (4, k, 2, m)).astype(np.float32)
-    counts = generator.uniform(0, 1, (k, 2, m)).astype(np.float32)
-    contrast, dark = generator.uniform(0.1, 0.6, k).astype(np.float32), np.arange(k) % 2 == 0
-    noise = generator.uniform(1, 5, k).astype(np.float32)
-    glare, lit = np.float32([200, 256, np.inf]), generator.uniform(0.05, 0.5, k).astype(np.float32)
-    every = np.float32([0, *shares, 1])
-    looks, typical = kernels.step_evidence(
-        *(ground, band, *parts, counts, every, contrast, dark, noise, glare, lit),
-        *(OFFSET, WHITE, FLAT, FLAT_WHITE, MARK, TAIL, SHARE, ANY, PLAIN, AT_ENDS),
-    )
-    for b, side, a in itertools.product(range(k), range(2), range(m)):
-        here, beside = float(band[b, side, a]), float(ground[b, side, a])
-        bare, marked, bare_here, marked_here = parts[:, b, side, a].astype(float)
-        ink_of = here, float(contrast[b]), bool(dark[b])
+@dataclass
+class Band:
+    """One band: its polar image, how it looks, and its edges."""
+
+    gray: np.ndarray
+    reach: np.ndarray
+    plate: np.ndarray
+    looks: np.ndarray  # outermost, size, blur, polarity, contrast, noise, shade, glare
+    edges: np.ndarray
+    weight: float
+
+    @staticmethod
+    def random(generator: np.random.Generator) -> Band:
+        plates = generator.uniform(2, 4.5, ANGLES)
+        looks = [
+            *(OUTERMOST, generator.uniform(3, 20), generator.uniform(0.5, 2)),
+            *(generator.choice([-1, 1]), generator.uniform(0.1, 0.6), generator.uniform(1, 5)),
+            *(generator.choice([0, 80, 150]), generator.choice([200, 256, np.inf])),
+        ]
+        top = generator.choice([100, 200, 260])
+        return Band(
+            gray=generator.uniform(0, top, (CIRCLES, ANGLES)).astype(np.float32),
+            reach=np.where(generator.random(ANGLES) < 0.7, np.inf, 3.0),
+            plate=np.where(generator.random(ANGLES) < 0.3, plates, np.inf),
+            looks=np.array(looks),
+            edges=np.array([1.0, generator.uniform(1.8, 2.2), generator.uniform(2.6, 3)]),
+            weight=generator.uniform(0.2, 1),
+        )
+
+    def gray_at(self, radius: float, angle: int) -> float:
+        return float(np.interp(radius, CIRCLE_RADII, self.gray[:, angle].astype(float)))
+
+    def lit(self) -> float:
+        """Return the probability of an edge of light between neighbours."""
+        dot, inner, _ = self.edges
+        edges = 0
+        for a in range(ANGLES):
+            near, far = (
+                self.gray_at(dot + LIMITS[name] * (inner - dot), a) for name in ('first', 'second')
+            )
+            noise = sum((self.looks[5] / (max(of, 0) + OFFSET)) ** 2 for of in (near, far))
+            edges += (level(near) - level(far)) ** 2 > LIMITS['edge'] ** 2 + 4 * noise
+        return min(max(edges / ANGLES, LIMITS['least doubt']), LIMITS['most doubt'])
+
+    def read(self, side: int, a: int) -> tuple[list[float], float]:
+        """Return gray values and shares of ink on ground and on the band, and what counts."""
+        (_, size, blur), (dot, inner, outer) = self.looks[:3], self.edges
+        beside = (LIMITS['beside'] + max(blur - LIMITS['soft'], 0)) / size
+        beside = min(max(beside, LIMITS['least']), LIMITS['most'])
+        within = min(beside, 0.45 * (outer - inner))
+        ground = outer + beside if side else inner - min(beside, 0.5 * (inner - dot))
+        if side:
+            ground = min(ground, (self.plate[a] + outer) / 2)
+        band = outer - within if side else inner + within
+        read = []
+        for at in (ground, band):
+            bare = share((dot - at) * size / blur) + share((at - self.plate[a]) * size / blur)
+            of_band = share((outer - at) * size / blur) - share((inner - at) * size / blur)
+            read += [self.gray_at(at, a), bare, bare + of_band]
+        shown = self.reach[a] >= max(ground, band) and (not side or self.plate[a] > outer)
+        return read, self.weight * shown
+
+    def odds(
+        self, side: int, a: int, shares: tuple[float, ...]
+    ) -> tuple[list[float], list[float]]:
+        """Return the evidence for shares of ink, and what paper and ink give on average."""
+        *_, polarity, contrast, noise, _, glare = self.looks
+        lit, dark = self.lit(), bool(polarity > 0)
+        (beside, bare, marked, here, bare_here, marked_here), counts = self.read(side, a)
+        ink_of = here, float(np.float32(contrast)), dark
         blank = printed(beside, bare, bare_here, *ink_of)
         ink = printed(beside, marked, marked_here, *ink_of)
-        white = min(ground[b, :, a]) >= WHITE and glare[b] <= WHITE
-        of_noise, of_ground = (noise[b] / (it + OFFSET) for it in (here, beside))
+        darker = min(self.read(of, a)[0][0] for of in (0, 1))
+        white = darker >= WHITE and glare <= WHITE
+        of_noise, of_ground = (noise / (it + OFFSET) for it in (here, beside))
         spread = math.sqrt((FLAT_WHITE if white else FLAT) ** 2 + of_noise**2 + of_ground**2)
         paper = density(level(here) - level(blank), spread)
         mark = level(ink) - level(beside)
@@ -102,82 +150,106 @@ def test_steps_are_compared_by_their_densities(seed: int, shares: tuple[float, .
         low, high = math.sqrt(MARK**2 + known), math.sqrt(TAIL**2 + known)
         width = high if more > 0 else low
         inked = density(more, width) * 2 * width / (low + high)
-        if beside >= glare[b] and -abs(mark) < more < 0:
+        if beside >= glare and -abs(mark) < more < 0:
             inked = max(inked, 1 / max(abs(mark), FLAT))
         anything = PLAIN * paper + (1 - PLAIN) * ANY
         width = math.sqrt(MARK**2 + (SHARE * mark) ** 2 + known)
-        densities, doubts = [paper], [lit[b]]
+        densities, doubts = [paper], [lit]
         for part in shares:
             on_ground, on_band = bare + part * (marked - bare), part * (marked_here - bare_here)
             mixed = printed(beside, on_ground, bare_here + on_band, *ink_of)
             densities.append(density(level(here) - level(mixed), width))
-            doubts.append(max(lit[b], AT_ENDS))
-        told = here < WHITE or not dark[b] or np.isinf(glare[b])
-        weight = counts[b, side, a] if told else 0
-        for s, (of, doubt) in enumerate(zip([*densities, inked], [*doubts, lit[b]], strict=True)):
-            odds = weight * math.log(((1 - doubt) * of + doubt * ANY) / anything)
-            assert looks[b, side, s, a] == pytest.approx(odds, abs=2e-4)
-        for index, (of, beneath) in enumerate(
-            [(spread, density(0, spread)), ((low + high) / 2, density(mark, spread))]
-        ):
+            doubts.append(max(lit, AT_ENDS))
+        told = here < WHITE or not dark or np.isinf(glare)
+        weight = counts if told else 0
+        looks = [
+            weight * math.log(((1 - doubt) * of + doubt * ANY) / anything)
+            for of, doubt in zip([*densities, inked], [*doubts, lit], strict=True)
+        ]
+        typical = []
+        for of, beneath in [
+            (spread, density(0, spread)),
+            ((low + high) / 2, density(mark, spread)),
+        ]:
             plain = PLAIN * beneath + (1 - PLAIN) * ANY
-            odds = math.log(((1 - lit[b]) * density(0, of) + lit[b] * ANY) / plain)
-            odds = (1 - lit[b]) * odds + lit[b] * math.log(lit[b] / (1 - PLAIN))
-            wanted = weight * odds if shares else 0
-            assert typical[b, side, index, a] == pytest.approx(wanted, abs=2e-4)
+            odds = math.log(((1 - lit) * density(0, of) + lit * ANY) / plain)
+            typical.append(weight * ((1 - lit) * odds + lit * math.log(lit / (1 - PLAIN))))
+        return looks, typical
 
+    def covered(self, ink_over_paper: np.ndarray) -> np.ndarray:
+        """Return where something covers the ground, (2, m), from the evidence, (2, m)."""
+        *_, polarity, contrast, _, shade, _ = self.looks
+        dark, step = bool(polarity > 0), contrast if polarity > 0 else 1 / contrast
+        places = list(itertools.product(range(2), range(ANGLES)))
+        ground, band, lit, seen = {}, {}, {}, {}
+        for it in places:
+            (ground[it], _, marked, band[it], _, _), counts = self.read(*it)
+            lit[it] = max(ground[it], ground[it] / (1 + marked * (step - 1)))
+            seen[it] = counts > 0
 
-@pytest.mark.parametrize('seed', range(12))
-def test_covers_are_dark_ground_that_is_no_shadow(seed: int) -> None:
-    generator = np.random.default_rng(seed)
-    k, m, edge, least = 3, 8, 0.3, 0.2
-    ground, band = generator.uniform(0, 120, (2, k, 2, m)).astype(np.float32)
-    lit = np.maximum(ground, generator.uniform(0, 120, (k, 2, m)).astype(np.float32))
-    marked, visible = generator.random((2, k, 2, m)) < np.reshape([0.2, 0.8], (2, 1, 1, 1))
-    shade, contrast = np.full(k, 60, np.float32), np.full(k, 0.3, np.float32)
-    dark = np.arange(k) % 2 == 0
-    covered = kernels.covered_ground(
-        *(ground, band, lit, marked, visible, shade, contrast, dark, OFFSET, WHITE, edge, least)
-    )
-    for b in range(k):
+        def ink(by: float) -> float:
+            return printed(shade, 0, 1, by, contrast, dark)
 
-        def ink(seen: float, b: int = b) -> float:
-            return printed(shade[b], 0, 1, seen, contrast[b], dark[b])
-
-        places = list(itertools.product(range(2), range(m)))
-        dim = {it: visible[b][it] and lit[b][it] <= shade[b] for it in places}
+        dim = {it: seen[it] and lit[it] <= shade for it in places}
         shadowed = sum(
-            dim[it] and marked[b][it] and band[b][it] < ink(band[b][it]) for it in places
+            dim[it] and ink_over_paper[it] > 0 and band[it] < ink(band[it]) for it in places
         )
-        if shadowed > least * sum(dim.values()):
+        if shadowed > LIMITS['marked'] * sum(dim.values()):
             dim = dict.fromkeys(places, False)
         alike = {
-            (name, it): abs(level(of[b][it]) - level(ink(lit[b][it]))) < edge
+            (name, it): abs(level(of[it]) - level(ink(lit[it]))) < LIMITS['edge']
             for it in places
             for name, of in (('ground', ground), ('band', band))
         }
+        found = np.zeros((2, ANGLES), bool)
         for side, a in places:
             other = 1 - side, a
             across = alike['band', (0, a)] and alike['band', (1, a)]
-            hidden = dim[other] and alike['ground', other] and across
-            assert covered[b, side, a] == (dim[side, a] or hidden)
+            found[side, a] = dim[side, a] or (dim[other] and alike['ground', other] and across)
+        return found
 
 
-@pytest.mark.parametrize('seed', range(6))
-def test_circles_beyond_an_outline_vote_for_it(seed: int) -> None:
+def stacked(bands: list[Band]) -> tuple[np.ndarray, ...]:
+    """Return bands as the kernels take them, up to their edges."""
+    images = np.stack([of.gray for of in bands[::-1]])
+    rows = np.arange(len(bands))[::-1].copy()
+    of_bands = (
+        np.stack([getattr(of, name) for of in bands]) for name in ('reach', 'plate', 'looks')
+    )
+    return images, rows, *of_bands
+
+
+@pytest.mark.parametrize('shares', [(), (0.25, 0.5, 0.75)])
+@pytest.mark.parametrize('seed', range(8))
+def test_steps_are_compared_by_their_densities(seed: int, shares: tuple[float, ...]) -> None:
     generator = np.random.default_rng(seed)
-    i, c, m, s, k = 2, 2 + seed, 3, 4, 3
-    gray = generator.integers(0, 4, (i, c, m)).astype(np.float32)
-    row, white = generator.integers(0, i, k), np.full((k, m), 2, np.float32)
-    radii, least = np.tile(np.arange(1.0, c + 1), (k, 1)), generator.uniform(0, 4, k)
-    beyond = generator.integers(0, c + 1, (s, m))
-    votes, outermost, _ = kernels.ground_votes(gray, row, white, radii, least, beyond)
-    for b in range(k):
-        signs = np.sign(gray[row[b]] - 2) * (radii[b] >= least[b])[:, None]
-        assert outermost[b] == signs[-1].sum()
-        for shape in range(s):
-            counted = sum(signs[c - beyond[shape, a] :, a].sum() for a in range(m))
-            assert votes[b, shape] == (counted if outermost[b] > 0 else 0)
+    bands = [Band.random(generator) for _ in range(4)]
+    edges, weight = np.stack([of.edges for of in bands]), np.float32([of.weight for of in bands])
+    every = np.float32([0, *shares, 1])
+    looks, typical, covered, lit, *_ = kernels.edge_evidence(
+        *stacked(bands), edges, weight, every, DECIDING
+    )
+    assert lit == pytest.approx([band.lit() for band in bands])
+    for b, side, a in itertools.product(range(4), range(2), range(ANGLES)):
+        odds, usual = bands[b].odds(side, a, shares)
+        assert looks[b, side, :, a] == pytest.approx(odds, abs=1e-3)
+        assert typical[b, side, :, a] == pytest.approx(usual, abs=1e-3)
+    for b, band in enumerate(bands):
+        expected = band.covered(looks[b, :, -1] - looks[b, :, 0])
+        assert covered[b].tolist() == expected.tolist()
+
+
+def test_edges_are_tried_at_several_places() -> None:
+    bands = [Band.random(np.random.default_rng(seed)) for seed in range(3)]
+    weight = np.float32([of.weight for of in bands])
+    edges = np.stack([[of.edges, np.add(of.edges, [0, 0.1, -0.1])] for of in bands])
+    looks, *_ = kernels.shifted_evidence(*stacked(bands), edges, weight, DECIDING)
+    for shift in range(2):
+        every = np.float32([0, 1])
+        alone, *_ = kernels.edge_evidence(
+            *stacked(bands), edges[:, shift].copy(), weight, every, DECIDING
+        )
+        assert np.array_equal(looks[:, shift], alone[:, 0] + alone[:, 1])
 
 
 @pytest.mark.parametrize('value', [np.nan, np.inf, -np.inf])
@@ -188,3 +260,9 @@ def test_no_value_leads_beyond_an_array(value: float) -> None:
     assert values.shape == (2, 1, 4)
     finite = kernels.gray_at(np.ones_like(gray), np.array([-5, 99]), 0.3, np.full(2, 0.3), radii)
     assert (finite == 1).all()
+    band = Band.random(np.random.default_rng(0))
+    for name in ('gray', 'reach', 'plate', 'looks', 'edges'):
+        setattr(band, name, np.full_like(getattr(band, name), value))
+        of = *stacked([band]), band.edges[None], np.float32([1]), np.float32([0, 1]), DECIDING
+        looks, *_ = kernels.edge_evidence(*of)
+        assert looks.shape == (1, 2, 2, ANGLES)

@@ -10,7 +10,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ahf_ros.families.ring.decoding import Words, bits_at, lengthened
+from ahf_ros import kernels
+from ahf_ros.families.ring.decoding import Words
 from ahf_ros.families.ring.light import clear_of
 from ahf_ros.families.ring.polar import LIGHT_EDGE, SOFT_EDGE, PolarImages, angles_of
 from ahf_ros.prints.ring import RingPrint
@@ -39,61 +40,43 @@ def unlike_print(
     `growth`, shape (k,), is that of ink in dot radii, and `overhang` by how many angles this makes
     arcs longer at either end.
     """
-    (number, count), (inner, outer) = words.hidden.shape, family.band
-    radii, about = polar.radii, (growth, inner - growth, outer + growth)
-    dot, inside, outside = (of[:, None] for of in about)
-    aside = (np.maximum(SOFT_EDGE * polar.blur, _MINIMUM_ASIDE) / polar.size)[:, None]
-    clear = clear_of(radii, family.circles, _ASIDE)
-    beyond = (radii > outside + np.maximum(aside, _BEYOND[0])) & (radii < outside + _BEYOND[1])
-    gap = (radii > 1 + dot + aside) & (radii < inside - aside)
-    deep = (radii > inside + aside) & (radii < outside - aside)
-    near = (radii > inside - aside) & (radii < outside + aside)
-    visible = (radii[:, None] <= polar.reach[..., None]) & clear[:, None]
+    count, (inner, outer) = words.hidden.shape[1], family.band
+    dot, inside, outside = growth, inner - growth, outer + growth
+    aside = np.maximum(SOFT_EDGE * polar.blur, _MINIMUM_ASIDE) / polar.size
+    beyond = outside + np.maximum(aside, _BEYOND[0]), outside + _BEYOND[1]
+    gap, deep = (1 + dot + aside, inside - aside), (inside + aside, outside - aside)
+    near = inside - aside, outside + aside
     phases = np.rint(words.starts * count / (2 * np.pi)).astype(int)
-    marked = bits_at(words.words, phases, count // family.bits, family)
-    away = aside[:, 0] * count / (np.pi * (inner + outer)) + 1
-    inked = lengthened(marked, overhang - away)
-    ink = inked[..., None] & deep[:, None] & visible
-    unmarked = ~lengthened(marked, overhang + away)
-    paper = ((gap | beyond)[:, None] | (unmarked[..., None] & near[:, None])) & visible
-    ground = np.broadcast_to(beyond[:, None] & visible, (*polar.reach.shape, radii.shape[1]))
-    step = _step_shares(polar, ground)
-    uneven = (np.abs(step) > _EVEN) & ground
-    even = uneven.sum(axis=(1, 2)) < _UNEVEN * ground.sum(axis=(1, 2))
-    of_dot = step[..., (radii < _INMOST).all(axis=0)].mean(axis=(1, 2))
-    even &= (of_dot > 1 - _EVEN) & (of_dot < _DEEPER)
-    faded, stray = ink & (step < _UNLIKE), paper & (step > _EVEN)
-    lost = np.count_nonzero(faded, axis=2) >= _READINGS
-    printed = np.maximum(np.count_nonzero(ink.any(axis=2), axis=1), 1)
-    of_marks = np.count_nonzero(lost, axis=1) / printed
-    odd = faded | stray
-    odd[..., 1:] &= odd[..., :-1]  # noise is of one reading
-    told = inked | unmarked
-    places = (phases[:, None] + np.arange(count)) % count
-    sectors = number, family.bits, count // family.bits
-    differ = np.take_along_axis(odd & told[..., None], places[..., None], axis=1)
-    of_told = np.take_along_axis(told, places, axis=1).reshape(sectors).sum(axis=2)
-    at_radius = differ.reshape(*sectors, -1).sum(axis=2) / np.maximum(of_told, 1)[..., None]
-    of_sectors = at_radius.max(axis=2)
-    unlike = np.maximum(of_sectors.mean(axis=1), _OF_MARKS * of_marks)
-    return np.where(even, unlike, np.nan)
-
-
-def _step_shares(polar: PolarImages, ground: np.ndarray) -> np.ndarray:
-    """Return steps of ln from the light that ground shows, in those of ink, (k, m, n).
-
-    That light is a plane in ln, as a lamp nearby makes it.
-    """
-    values = np.log(polar.gray[polar.row].swapaxes(1, 2) + np.float32(LOG_OFFSET))
-    angles, radii = angles_of(ground.shape[1])[:, None], polar.radii[0]
-    plane = np.stack([np.ones(ground.shape[1:]), *(radii * of(angles) for of in (np.cos, np.sin))])
-    beyond = np.asarray(ground.any(axis=(0, 1)))
-    beyond[-1] = True  # blur may leave none
-    seen, known, basis = (
-        of[..., beyond].reshape(len(of), -1).astype(float) for of in (values, ground, plane)
-    )
-    light, _ = fit_linear(seen, known, basis.T, LIGHT_EDGE)
-    of_paper = np.tensordot(light, plane, axes=1)
+    away = aside * count / (np.pi * (inner + outer)) + 1
+    longer = np.rint([overhang - away, overhang + away]).astype(int)
+    radii, angles = polar.radii[0], angles_of(count)
+    clear = clear_of(radii, family.circles, _ASIDE)
+    light = _light_on(polar, np.where(clear, radii, np.inf), *beyond)
     paper = np.maximum(np.exp(light[:, :1]) - LOG_OFFSET, 0)
     step = np.log(polar.inked(paper, paper) + LOG_OFFSET) - light[:, :1]
-    return (values - of_paper) / np.where(step == 0, np.inf, step)[..., None]
+    return kernels.unlike_shares(
+        *(polar.gray, polar.row, light, step[:, 0], radii, clear, polar.reach),
+        *(np.array([np.cos(angles), np.sin(angles)]), words.words, phases, longer),
+        np.array([beyond, gap, deep, near]).transpose(2, 0, 1),
+        *(LOG_OFFSET, _EVEN, _UNEVEN, _INMOST, _DEEPER, _UNLIKE, _READINGS, _OF_MARKS),
+        n=family.bits,
+    )[0]
+
+
+def _light_on(
+    polar: PolarImages, radii: np.ndarray, low: np.ndarray, high: np.ndarray
+) -> np.ndarray:
+    """Return the planes in ln of the light that ground between radii (k,) shows, (k, 3).
+
+    A lamp nearby makes light like this. The radii of circles are (n,).
+    """
+    beyond: np.ndarray = (radii > low[:, None]) & (radii < high[:, None])
+    used = np.asarray(beyond.any(axis=0))
+    used[-1] = True  # blur may leave none
+    some = np.flatnonzero(used)
+    seen = polar.levels(polar.gray[polar.row[:, None], some])
+    known = beyond[:, some, None] & (radii[some, None] <= polar.reach[:, None])
+    angles, at = angles_of(seen.shape[2]), polar.radii[0, some, None]
+    plane = [np.ones(seen.shape[1:]), at * np.cos(angles), at * np.sin(angles)]
+    values, weights = (of.reshape(len(seen), -1).astype(float) for of in (seen, known))
+    return fit_linear(values, weights, np.reshape(plane, (3, -1)).T, LIGHT_EDGE)[0]

@@ -373,16 +373,6 @@ def bits_at(
     return (words[..., None] >> sector & 1).astype(bool)
 
 
-def lengthened(bits: np.ndarray, overhang: np.ndarray) -> np.ndarray:
-    """Return bits (k, ..., m) whose arcs of ink are longer at either end by angles, shape (k,)."""
-    longer = np.rint(overhang).astype(int).reshape(-1, *(1,) * (bits.ndim - 1))
-    for step in range(1, int(np.abs(longer).max(initial=0)) + 1):
-        before, after = np.roll(bits, 1, axis=-1), np.roll(bits, -1, axis=-1)
-        bits = np.where(longer >= step, bits | before | after, bits)
-        bits = np.where(longer <= -step, bits & before & after, bits)
-    return bits
-
-
 def _clearest(evidence: Evidence) -> np.ndarray:
     """Return the angle at which each band is seen best, shape (k,)."""
     best = np.maximum(evidence.paper, evidence.ink)

@@ -20,7 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ahf_ros import kernels
-from ahf_ros.families.ring.polar import CORRELATION, LIGHT_EDGE, PolarImages
+from ahf_ros.families.ring.polar import CORRELATION, INNERMOST, LIGHT_EDGE, PolarImages
 from ahf_ros.vision.array_record import ArrayRecord
 from ahf_ros.vision.circle_fit import SOFT
 from ahf_ros.vision.image import SATURATED
@@ -52,6 +52,16 @@ SHARES = (0.25, 0.5, 0.75)
 SURPRISES = (0.05, 0.5)
 """Least and largest probability of light that nothing predicts."""
 
+# In the order of band_edges.c.
+_DECIDING = np.array(
+    [
+        *(INNERMOST, LOG_OFFSET, SATURATED),
+        *(_BESIDE, SOFT, _MINIMUM_BESIDE, _MAXIMUM_BESIDE, *_ACROSS),
+        *(LIGHT_EDGE, *SURPRISES, _MARKED),
+        *(_FLAT, _WHITE, _MARK, _MARK_TAIL, _SHARE, _ANY, _PLAIN, _AT_ENDS),
+    ]
+)
+
 HOPEFUL = 0.2
 """Mean log odds of a reading, from which a band is read on."""
 
@@ -73,7 +83,7 @@ class Evidence(ArrayRecord):
         mixes both, and where it is marked.
     typical : ndarray of float32, shape (k, 2, 2, m)
         What edges of paper and of ink give on average where these look as they should, as far as
-        edges of light let them; only where shares of ink are asked for.
+        edges of light let them.
     weight : ndarray of float32, shape (k,)
         Of a reading, which is part of all; less than 1 where neighbours tell the same.
     dot : ndarray of float32, shape (k,)
@@ -81,7 +91,7 @@ class Evidence(ArrayRecord):
     lit : ndarray of float32, shape (k,)
         Probability that an edge of light lies between two neighbouring readings.
     covered : ndarray of bool, shape (k, 2, m)
-        Where something covers the ground beside the band; only where shares of ink are asked for.
+        Where something covers the ground beside the band.
     blur : ndarray of float64, shape (k,)
         Of ends of arcs, standard deviation in angles.
     """
@@ -163,63 +173,41 @@ def edge_evidence(
     From the radii of the dots as printed and the growth of their colour, (k,), units of the frame.
     """
     inner, outer = band_edges(radius, growth, band)
-    lit = light_edges(polar, radius, growth, inner)
-    places = _beside_edges(polar, radius + growth, inner, outer)
-    ground_at, band_at = places
-    ground, inside = map(polar.at, places)
-    of_shares = polar.plate, radius + growth, inner, outer, polar.blur / polar.size
-    (bare, marked), (bare_inside, marked_inside) = (
-        kernels.ink_shares(at, *of_shares) for at in places
+    edges, weight = np.stack([radius + growth, inner, outer], axis=1), weights(polar)
+    every = np.array([0, *shares, 1], np.float32)
+    looks, typical, covered, lit, *_ = kernels.edge_evidence(
+        *_on_circles(polar), edges, weight, every, _DECIDING
     )
-    weight = weights(polar)
-    visible = polar.reach[:, None] >= np.maximum(ground_at, band_at)
-    visible[:, 1] &= polar.plate > outer[:, None]
-    dark = polar.polarity > 0
-    looks, typical = kernels.step_evidence(
-        *(ground, inside, bare, marked, bare_inside, marked_inside),
-        *(weight[:, None, None] * visible, np.array([0, *shares, 1], np.float32)),
-        *(polar.contrast, dark, polar.noise, polar.glare, lit),
-        *(LOG_OFFSET, SATURATED, _FLAT, _WHITE, _MARK, _MARK_TAIL, _SHARE),
-        *(_ANY, _PLAIN, _AT_ENDS),
-    )
-    covered = np.zeros(visible.shape, bool)
-    if shares:
-        covered = kernels.covered_ground(
-            *(ground, inside, np.maximum(ground, polar.paper(ground, marked))),
-            *(looks[:, :, -1] > looks[:, :, 0], visible, polar.shade, polar.contrast, dark),
-            *(LOG_OFFSET, SATURATED, LIGHT_EDGE, _MARKED),
-        )
     return Evidence(
         looks=looks,
         typical=typical,
         weight=weight,
         dot=np.zeros_like(weight),
-        lit=lit.astype(np.float32),
+        lit=lit,
         covered=covered,
         blur=_blur_along(polar, band),
     )
 
 
-def _beside_edges(
-    polar: PolarImages, dot: np.ndarray, inner: np.ndarray, outer: np.ndarray
+def shifted_evidence(
+    polar: PolarImages, shifts: Sequence[float] | np.ndarray, band: tuple[float, float]
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return radii beside the edges of bands, on ground and in the band, (k, 2, 1) or (k, 2, m).
+    """Return growths of ink by s shifts of edges, px, and the evidence for paper and for ink then.
 
-    The edges of dots and bands are at radii (k,). Where a plate ends, ground is read in the middle
-    of its rim.
+    The growths, (k, s), are in radii of the dots as they are seen; the evidence of both edges
+    together has the shape (k, s, 2, m).
     """
-    beside = _BESIDE + np.maximum(polar.blur - SOFT, 0)
-    beside = np.clip(beside / polar.size, _MINIMUM_BESIDE, _MAXIMUM_BESIDE)
-    before = np.minimum(beside, 0.5 * (inner - dot))
-    within = np.minimum(beside, 0.45 * (outer - inner))
-    ground, band = (
-        np.stack(of, axis=1)[..., None]
-        for of in ((inner - before, outer + beside), (inner + within, outer - within))
-    )
-    if np.isfinite(polar.plate).any():
-        ground = np.repeat(ground, polar.plate.shape[1], axis=2)
-        ground[:, 1] = np.minimum(ground[:, 1], (polar.plate + outer[:, None]) / 2)
-    return ground, band
+    growth = growth_by(np.asarray(shifts), polar.size[:, None])
+    edges = np.stack([np.ones_like(growth), *band_edges(1 - growth, growth, band)], axis=2)
+    looks, *_ = kernels.shifted_evidence(*_on_circles(polar), edges, weights(polar), _DECIDING)
+    return growth, looks
+
+
+def _on_circles(polar: PolarImages) -> tuple[np.ndarray, ...]:
+    """Return polar images as kernels take them."""
+    of = polar.outermost, polar.size, polar.blur, polar.polarity, polar.contrast, polar.noise
+    looks = np.stack([*of, polar.shade, polar.glare], axis=1)
+    return polar.gray, polar.row, polar.reach, polar.plate, looks
 
 
 def _blurred(
@@ -242,18 +230,6 @@ def _blurred(
 def _blur_along(polar: PolarImages, band: tuple[float, float]) -> np.ndarray:
     """Return the blur of ends of arcs, standard deviations in angles, shape (k,)."""
     return np.asarray(polar.blur / (np.pi * sum(band) * polar.size / polar.gray.shape[2]))
-
-
-def light_edges(
-    polar: PolarImages, radius: np.ndarray, growth: np.ndarray, inner: np.ndarray
-) -> np.ndarray:
-    """Return the probabilities of an edge of light between neighbours, as gaps show it, (k,)."""
-    start, width = radius + growth, inner - radius - growth
-    across = polar.at((start[:, None] + np.multiply.outer(width, _ACROSS))[..., None])
-    level, noise = polar.logs(across)
-    step = np.abs(level[:, 0] - level[:, 1])
-    many = (step**2 > LIGHT_EDGE**2 + 4 * (noise**2).sum(axis=1)).mean(axis=1)
-    return np.clip(many, *SURPRISES)
 
 
 def _gain(paper: np.ndarray, ink: np.ndarray) -> np.ndarray:

@@ -36,10 +36,13 @@ PART = 256
 SOFT_EDGE = 1.6
 """Distance from an edge at which it ends, in its blur."""
 
+INNERMOST = 0.3
+"""Radius of the first circle, dot radii."""
+
 CIRCLES = 56
 """Of a polar image, which are then less than a tenth of a dot radius apart."""
 
-_INNERMOST, _MARGIN = 0.3, 0.95  # first circle, and last one beyond the band, dot radii
+_MARGIN = 0.95  # of the last circle beyond the band, dot radii
 _PRINTED = 0.25  # usual contrast of prints, up to which the levels of dots count
 _LEVELS = np.array([0.75, 1.4])  # where those of dot and gap are read, radii of the dot as seen
 _MINIMUM_SHARE = 0.3  # of ink that a level tells, between those of dot and gap
@@ -109,16 +112,12 @@ class PolarImages(ArrayRecord):
     @property
     def radii(self) -> np.ndarray:
         """Radii of the circles, dot radii, shape (k, n)."""
-        return np.linspace(_INNERMOST, self.outermost, self.gray.shape[1], axis=1)
+        return np.linspace(INNERMOST, self.outermost, self.gray.shape[1], axis=1)
 
     def select(self, which: np.ndarray | slice) -> PolarImages:
         """Return some of the dots; their images are those of all, which are not copied."""
         whole = replace(self, gray=self.row)
         return replace(ArrayRecord.select(whole, which), gray=self.gray)
-
-    def repeated(self, times: int) -> PolarImages:
-        """Return all dots several times, one time after the other."""
-        return self.select(np.tile(np.arange(len(self.row)), times))
 
     def rim(self, outer: float) -> np.ndarray:
         """Return up to which radii a plate is dark, and from which paper is white, (k, 2, m).
@@ -134,7 +133,7 @@ class PolarImages(ArrayRecord):
 
         The radii are in dot radii.
         """
-        return kernels.gray_at(self.gray, self.row, _INNERMOST, self.outermost, radii)
+        return kernels.gray_at(self.gray, self.row, INNERMOST, self.outermost, radii)
 
     def inked(self, paper: np.ndarray, seen: np.ndarray) -> np.ndarray:
         """Return the gray values of ink of the dot's colour where paper has some, (k, ...).
@@ -189,8 +188,10 @@ def polar_images(
     """Return the polar images of targets at some angles, see `angles_of`, on some circles."""
     inner, outer = band
     outermost = outer + _MARGIN
-    radii = np.linspace(_INNERMOST, outermost, circles)
-    values, reach = _on_circles(gray, dots, angles_of(count), np.tile(radii, (len(dots.frames), 1)))
+    radii = np.linspace(INNERMOST, outermost, circles)
+    values, reach = _on_circles(
+        gray, dots, angles_of(count), np.tile(radii, (len(dots.frames), 1))
+    )
     contrast, lift = _appearance(gray, dots, band)
     values = lifted(values, lift.astype(np.float32)[:, None, None])
     places = [*(1 + (inner - 1) * GAP), *(outer + MARGIN)]
@@ -340,7 +341,7 @@ def _outlines(count: int, circles: int, outer: float) -> tuple[np.ndarray, np.nd
 
     Then comes how many circles lie beyond, and what votes for a shape weigh.
     """
-    radii = np.linspace(_INNERMOST, outer + _MARGIN, circles)
+    radii = np.linspace(INNERMOST, outer + _MARGIN, circles)
     sizes = radii[radii > outer][::-1]
     turns = np.append(np.arange(0, 90, _TURN), np.nan)
     across = np.deg2rad((np.rad2deg(angles_of(count)) - turns[:, None] + 45) % 90 - 45)

@@ -18,7 +18,7 @@ import numpy as np
 
 from ahf_ros.families.ring.circles import RAYS, REACH
 from ahf_ros.families.ring.known import Explained
-from ahf_ros.families.ring.likelihood import FEW_MARKS, band_edges, edge_evidence, growth_by
+from ahf_ros.families.ring.likelihood import FEW_MARKS, band_edges, shifted_evidence, weights
 from ahf_ros.families.ring.polar import (
     DOT,
     MARGIN,
@@ -199,41 +199,43 @@ def _bounds(
     angles = _PER_SECTOR * max(bits)
     polar = on_dark_ground(polar_images(gray, dots, band, angles, _CIRCLES), band)
     tried = shifts or np.linspace(-_MAXIMUM_SHIFT, _MAXIMUM_SHIFT, _SHIFTS)
-    every = polar.repeated(len(tried))
-    growth = growth_by(np.repeat(tried, len(polar.size)), every.size)
-    edges = edge_evidence(every, 1 - growth, growth, band)
-    holes = _holes(every, band_edges(1 - growth, growth, band)[1])
-    cap = _CAP * edges.weight[:, None]
-    marked = np.clip((edges.ink - edges.paper).sum(axis=1), -cap, cap)
-    looks = np.stack([edges.paper.sum(axis=1), edges.ink.sum(axis=1), marked], axis=1)
+    growth, looks = shifted_evidence(polar, tried, band)
+    weight, holes = weights(polar)[:, None], _holes(polar, band_edges(1 - growth, growth, band)[1])
+    cap = _CAP * weight[..., None, None]
+    marked = np.clip(looks[:, :, 1:] - looks[:, :, :1], -cap, cap)
+    looks = np.concatenate([looks, marked], axis=2)
     best = np.empty((len(bits), len(dots.frames)))
     for index, count in enumerate(bits):
-        sectors = (looks @ _sectors(angles, count)).reshape(*looks.shape[:2], _PHASES, count)
-        paper, ink, marked = sectors.swapaxes(0, 1)
-        of_word = np.maximum(np.maximum(paper, ink), -_COVER).sum(axis=2)
-        bound = np.minimum(of_word, np.maximum(marked, 0).sum(axis=2)).max(axis=1)
-        bound = np.where(holes, -np.inf, bound / (angles * edges.weight))
-        best[index] = bound.reshape(len(tried), -1).max(axis=0)
+        sectors = looks.reshape(-1, angles) @ _sectors(angles, count)
+        paper, ink, marked = sectors.reshape(*looks.shape[:3], _PHASES, count).transpose(
+            2, 0, 1, 3, 4
+        )
+        of_word = np.maximum(np.maximum(paper, ink), -_COVER).sum(axis=3)
+        bound = np.minimum(of_word, np.maximum(marked, 0).sum(axis=3)).max(axis=2)
+        best[index] = np.where(holes, -np.inf, bound / (angles * weight)).max(axis=1)
     return best
 
 
 def _holes(polar: PolarImages, outer: np.ndarray) -> np.ndarray:
-    """Return whether dots are holes through which one sees what lies beyond the band, (k,).
+    """Return whether dots are holes through which one sees what lies beyond the band, (k, s).
 
-    From the radii of the outer edges of the bands, (k,).
+    From s radii of the outer edges of each band, (k, s).
     """
     bright = np.flatnonzero(polar.polarity < 0)
-    holes = np.zeros(len(outer), bool)
+    holes = np.zeros(outer.shape, bool)
     if not bright.size:
         return holes
-    polar, outer = polar.select(bright), outer[bright]
+    polar, beyond = (
+        polar.select(bright),
+        (outer[bright, :, None] + MARGIN).reshape(bright.size, -1),
+    )
     inside, outside = (
         polar.levels(polar.at(radii[..., None]))
-        for radii in (np.tile(DOT, (len(outer), 1)), outer[:, None] + MARGIN)
+        for radii in (np.tile(DOT, (bright.size, 1)), beyond)
     )
-    usual = medians(inside.reshape(len(outer), -1))[:, None, None]
-    alike = np.abs(outside - usual) < _ALIKE
-    holes[bright] = (alike.mean(axis=2) > _BEYOND).all(axis=1)
+    usual = medians(inside.reshape(bright.size, -1))[:, None, None]
+    alike = (np.abs(outside - usual) < _ALIKE).mean(axis=2) > _BEYOND
+    holes[bright] = alike.reshape(bright.size, -1, len(MARGIN)).all(axis=2)
     return holes
 
 

@@ -26,8 +26,8 @@ from ahf_ros.families.ring.likelihood import (
     SHARES,
     Evidence,
     edge_evidence,
-    growth_by,
     level_evidence,
+    shifted_evidence,
 )
 from ahf_ros.families.ring.polar import (
     DEPTHS,
@@ -142,15 +142,13 @@ def best_growth(
     """
     reach, plate = polar.reach[:, ::2], polar.plate[:, ::2]
     half = replace(polar, gray=polar.gray[..., ::2].copy(), reach=reach, plate=plate)
-    every = half.repeated(len(_SHIFTS))
-    tried = growth_by(np.repeat(_SHIFTS, len(polar.size)), every.size)
-    edges = edge_evidence(every, 1 - tried, tried, band)
-    paper, ink = edges.paper.sum(axis=1), edges.ink.sum(axis=1)
+    tried, looks = shifted_evidence(half, _SHIFTS, band)
+    paper, ink = looks[:, :, 0], looks[:, :, 1]
     # Any ground is as even as paper somewhere, but only a band has ink.
-    score = np.maximum(ink - np.maximum(paper, 0), 0).sum(axis=1).reshape(len(_SHIFTS), -1)
-    unusual = (np.multiply.outer(_SHIFTS, polar.polarity) - prior.shift) / prior.deviation
-    best = (score - 0.5 * unusual**2).argmax(axis=0)
-    return tried.reshape(score.shape)[best, np.arange(len(best))]
+    score = np.maximum(ink - np.maximum(paper, 0), 0).sum(axis=2)
+    unusual = (np.multiply.outer(polar.polarity, _SHIFTS) - prior.shift) / prior.deviation
+    best = (score - 0.5 * unusual**2).argmax(axis=1)
+    return tried[np.arange(len(best)), best]
 
 
 def _doubtful(words: Words, edges: Evidence) -> np.ndarray:

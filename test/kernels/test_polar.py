@@ -1,0 +1,88 @@
+"""Polar images and what they show, against the formulas of one point."""
+
+import numpy as np
+import pytest
+
+from ahf_ros import kernels
+
+
+def at(image: np.ndarray, x: float, y: float) -> float:
+    """Return the gray value between pixels, of the nearest one beyond the border."""
+    height, width = image.shape
+    x, y = min(max(x, 0), width - 1), min(max(y, 0), height - 1)
+    left, top = min(int(x), max(width - 2, 0)), min(int(y), max(height - 2, 0))
+    part = image[top : top + 2, left : left + 2].astype(float)
+    across, down = x - left, y - top
+    rows = [(1 - across) * row[0] + across * row[-1] for row in part]
+    return (1 - down) * rows[0] + down * rows[-1]
+
+
+@pytest.mark.parametrize('shape', [(1, 1), (1, 9), (7, 1), (30, 40)])
+@pytest.mark.parametrize('seed', range(3))
+def test_circles_are_sampled_between_pixels(seed: int, shape: tuple[int, int]) -> None:
+    generator = np.random.default_rng(seed)
+    image = generator.uniform(0, 255, shape).astype(np.float32)
+    frames = np.tile(np.eye(3), (3, 1, 1)) + generator.normal(0, 0.003, (3, 3, 3))
+    frames[:, :2, :2] *= 6
+    frames[:, :2, 2] = generator.uniform(0, 30, (3, 2))
+    angles, radii = np.arange(70) / 70 * 2 * np.pi, np.sort(generator.uniform(0, 2, (3, 4)))
+    directions = np.array([np.cos(angles), np.sin(angles)])
+    values, reach = kernels.circle_values(image, frames, directions, radii)
+    for b in range(3):
+        for a in range(70):
+            shown = np.inf
+            for j, radius in enumerate(radii[b]):
+                x, y, scale = frames[b] @ [*(radius * directions[:, a]), 1]
+                assert values[b, j, a] == pytest.approx(at(image, x / scale, y / scale), abs=0.05)
+                inside = 0 <= x / scale <= shape[1] - 1 and 0 <= y / scale <= shape[0] - 1
+                if not inside and np.isinf(shown):
+                    shown = radii[b, j - 1] if j else 0.0
+            assert reach[b, a] == pytest.approx(shown)
+
+
+@pytest.mark.parametrize('shape', [(1, 2), (3, 3), (20, 30)])
+def test_noise_is_measured_by_second_differences(shape: tuple[int, int]) -> None:
+    generator = np.random.default_rng(shape[0])
+    image = generator.integers(0, 255, shape).astype(np.float32)
+    frames = np.tile(np.eye(3), (2, 1, 1))
+    frames[:, :2, 2] = generator.uniform(2, 20, (2, 2)).round()
+    points = generator.integers(-4, 5, (2, 90)).astype(float)
+    medians, _ = kernels.second_differences(image, frames, points)
+    padded = np.pad(image, ((0, max(3 - shape[0], 0)), (0, max(3 - shape[1], 0))), 'edge')
+    height, width = padded.shape
+    for b in range(2):
+        sizes = []
+        for x, y in (frames[b, :2, 2:] + points).T.astype(int):
+            left, top = min(max(x - 1, 0), width - 3), min(max(y - 1, 0), height - 3)
+            part = padded[top : top + 3, left : left + 3]
+            sizes.append(abs(np.array([1, -2, 1]) @ part @ [1, -2, 1]))
+        if min(shape) >= 3:
+            assert medians[b] == pytest.approx(np.median(sizes))
+
+
+@pytest.mark.parametrize('seed', range(6))
+def test_circles_beyond_an_outline_vote_for_it(seed: int) -> None:
+    generator = np.random.default_rng(seed)
+    i, c, m, s, k = 2, 2 + seed, 3, 4, 3
+    gray = generator.integers(0, 4, (i, c, m)).astype(np.float32)
+    row, white = generator.integers(0, i, k), np.full((k, m), 2, np.float32)
+    radii, least = np.tile(np.arange(1.0, c + 1), (k, 1)), generator.uniform(0, 4, k)
+    beyond = generator.integers(0, c + 1, (s, m))
+    votes, outermost, _ = kernels.ground_votes(gray, row, white, radii, least, beyond)
+    for b in range(k):
+        signs = np.sign(gray[row[b]] - 2) * (radii[b] >= least[b])[:, None]
+        assert outermost[b] == signs[-1].sum()
+        for shape in range(s):
+            counted = sum(signs[c - beyond[shape, a] :, a].sum() for a in range(m))
+            assert votes[b, shape] == (counted if outermost[b] > 0 else 0)
+
+
+@pytest.mark.parametrize('value', [np.nan, np.inf, -np.inf, 1e30])
+def test_no_value_leads_beyond_an_image(value: float) -> None:
+    image, frames = np.ones((3, 4), np.float32), np.full((1, 3, 3), value)
+    directions, radii = np.ones((2, 5)), np.ones((1, 2))
+    for shape in ((1, 1), (3, 4)):
+        values, _ = kernels.circle_values(image[: shape[0], : shape[1]], frames, directions, radii)
+        assert (values == 1).all()
+        sizes, _ = kernels.second_differences(image[: shape[0], : shape[1]], frames, directions)
+        assert sizes.tolist() == [0]
