@@ -237,6 +237,32 @@ void cctag_rings(count k, count c, count n, const double circles[k][c], const do
                  float by_shift[k][n], float by_blur[k][n], float by_sharpening[k][n],
                  float row[2][n]);
 
+/* square_places.c */
+
+void square_frames(count k, const double corners[k][4][2], double frames[k][3][3]);
+void taken_places(count k, count n, const double places[k][2], const double reach[k],
+                  const double points[n][2], bool taken[k]);
+void place_owners(count k, const double places[k][2], const double reach[k],
+                  const int64_t kinds[k], bool owning[k]);
+void place_rivals(count k, const double places[k][2], const double reach[k],
+                  const int64_t groups[k], const int64_t numbers[k], const double odds[k],
+                  double none, double no_number, double of_groups[k], double of_numbers[k]);
+
+/* square_prints.c */
+
+/* Prints of k markers of n by n cells, laid over an image from frames and blurs on (the first one,
+   the least and the most, in sides), where samples at m places along either side, in cells of
+   their own, are more than `inner` from the middle. Shares are of samples that look like the print,
+   0 where it did not settle; covariances are those of shifts of the frame. */
+void laid_prints(count h, count w, count k, count n, count m, count g, const float gray[h][w],
+                 const double start[k][3][3], const bool ink[k][n][n], const double places[m],
+                 const int32_t cells[m], const double blurs[k][3], double inner,
+                 double largest_step, double settled, double outlier, double normal_spread,
+                 double least, double agrees, double hopeless, double ridge, int16_t rounds,
+                 double frames[k][3][3], double unknowns[k][16], double shares[k],
+                 double covariance[k][2][2], double fields[10][m][m], double share[3][n][m],
+                 double samples[2][m][16], double sums[g][g][3]);
+
 /* ellipses.c */
 
 void strongest_steps(count k, count m, count n, const float values[k][m][n], const double scale[k],

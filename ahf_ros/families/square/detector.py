@@ -13,9 +13,9 @@ from typing import Any
 
 import numpy as np
 
+from ahf_ros import kernels
 from ahf_ros.base.blas import one_blas_thread
 from ahf_ros.base.target import SquareMarker, Target, sorted_targets
-from ahf_ros.families.claims import Rivals, owners
 from ahf_ros.families.contract import ExpectingDetector, moved_targets
 from ahf_ros.families.square.edges import fit_markers
 from ahf_ros.families.square.frames import Places, centres, side_lengths
@@ -37,6 +37,7 @@ _DRAFT_DEVIATION = 0.028
 _SMALL = 28.0  # diagonal of a marker whose cells are not much larger than pixels, px
 _SMALLEST_HALF = 24  # smaller side of a half that markers are looked for in, px
 _SAME_PLACE = 0.3  # distance of two readings of one marker, in sides
+_MANY = 1 << 32  # more than any dictionary has markers
 _SURE = 7.0  # logarithmic odds of a marker that is looked for in no half: a thousand to one
 _FITTED = 4.0  # logarithmic odds against a marker whose print was laid: half its eight unknowns
 _SEVERAL = 4.0  # power of their number, one in which each of several groups is there
@@ -103,8 +104,7 @@ class SquareDetector(ExpectingDetector):
         odds = np.concatenate([_odds_together(sure, groups), odds])
         readings = replace(Readings.joined([sure, doubtful]), odds=odds)
         readings = readings.select(np.argsort(-odds, kind='stable'))
-        one_place = _one_place(readings.corners)
-        readings = readings.select(owners(len(readings.odds), one_place))
+        readings = readings.select(_owning(readings, np.zeros(len(readings.odds), int)))
         decoded = readings.odds > MINIMUM_ODDS
         markers = _markers(readings, decoded, groups)
         return sorted_targets(
@@ -172,20 +172,16 @@ def _enlarged(corners: np.ndarray, level: int) -> np.ndarray:
 def _are_read(places: np.ndarray, readings: Readings) -> np.ndarray:
     """Return which quadrilaterals, shape (k, 4, 2), are where a marker was surely read, (k,)."""
     sure = readings.corners[readings.odds > _SURE]
-    distances = np.linalg.norm(places.mean(axis=1)[:, None] - sure.mean(axis=1), axis=2)
-    near = distances <= _SAME_PLACE * side_lengths(places).max(axis=1)[:, None]
-    return near.any(axis=1)
+    reach = _SAME_PLACE * side_lengths(places).max(axis=1)
+    taken: np.ndarray = kernels.taken_places(places.mean(axis=1), reach, sure.mean(axis=1))
+    return taken
 
 
 def _laid(gray: np.ndarray, readings: Readings, groups: Groups) -> np.ndarray:
     """Return the corners of prints that lie over the image where readings are doubtful."""
     readings = readings.select(np.argsort(-readings.odds, kind='stable'))
-    group, number, one_place = readings.group, readings.number, _one_place(readings.corners)
-
-    def same(index: int) -> np.ndarray:
-        return one_place(index) & (group == group[index]) & (number == number[index])
-
-    own = readings.select(owners(len(group), same) & (readings.odds <= MINIMUM_ODDS))
+    alike = readings.group * _MANY + readings.number
+    own = readings.select(_owning(readings, alike) & (readings.odds <= MINIMUM_ODDS))
     parts: dict[int, list[tuple[np.ndarray, np.ndarray]]] = {}
     for index, width in sorted(set(zip(own.group.tolist(), own.border.tolist(), strict=True))):
         alike = own.select((own.group == index) & (own.border == width))
@@ -211,13 +207,10 @@ def _odds_together(readings: Readings, groups: Groups) -> np.ndarray:
     place, as by borders of one and two cells, one is.
     """
     group, number, of_group = readings.group, readings.number, readings.odds
-    one_place = _one_place(readings.corners)
-    lead, odds = np.empty((2, len(group)))
-    for index, own in enumerate(of_group):
-        near, alike = one_place(index), group == group[index]
-        lead[index] = own - of_group[near & ~alike].max(initial=0.0)
-        marker = of_group[near & alike & (number != number[index])].max(initial=-inf)
-        odds[index] = -np.logaddexp(-own, max(readings.others[index], marker - own))
+    where = _places_of(readings.corners)
+    rival, other = kernels.place_rivals(*where, group, number, of_group, 0.0, -inf)
+    lead = of_group - rival
+    odds = -np.logaddexp(-of_group, np.maximum(readings.others, other - of_group))
     doubt = log(len(groups) ** _SEVERAL - 1) if len(groups) > 1 else -inf
     alone = log(len(groups) ** _ALONE - 1) if len(groups) > 1 else -inf
     against = np.full(len(odds), inf)
@@ -241,16 +234,19 @@ def _odds_together(readings: Readings, groups: Groups) -> np.ndarray:
     return -np.logaddexp(-odds, against)
 
 
-def _one_place(corners: np.ndarray) -> Rivals:
-    """Return which of k readings, whose corners have the shape (k, 4, 2), have one place."""
-    sizes = np.linalg.norm(corners - np.roll(corners, 2, axis=1), axis=2).max(axis=1)
-    middles = corners.mean(axis=1)
+def _owning(readings: Readings, kinds: np.ndarray) -> np.ndarray:
+    """Return which readings, the best first, are the first of their kind, (k,), in a place."""
+    owning: np.ndarray = kernels.place_owners(*_places_of(readings.corners), kinds)
+    return owning
 
-    def near(index: int) -> np.ndarray:
-        distances = np.linalg.norm(middles - middles[index], axis=1)
-        return distances <= _SAME_PLACE * np.maximum(sizes, sizes[index])
 
-    return near
+def _places_of(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the middles of readings, whose corners have the shape (k, 4, 2), and their reach, px.
+
+    Two of them have one place where one is within the reach of the other.
+    """
+    diagonals = np.linalg.norm(corners[:, 2:] - corners[:, :2], axis=2)
+    return corners.mean(axis=1), _SAME_PLACE * diagonals.max(axis=1)
 
 
 def _from_halves(gray: np.ndarray, corners: np.ndarray, ink: np.ndarray) -> np.ndarray:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 
+from ahf_ros import kernels
 from ahf_ros.vision.array_record import ArrayRecord
 
 SQUARE = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])
@@ -54,9 +54,8 @@ def side_lengths(corners: np.ndarray) -> np.ndarray:
 
 def square_frames(corners: np.ndarray) -> np.ndarray:
     """Return the frames of squares with corners, shape (k, 3, 3)."""
-    square = SQUARE.astype(np.float32)
-    found = [cv2.getPerspectiveTransform(square, of) for of in corners.astype(np.float32)]
-    return np.array(found).reshape(-1, 3, 3)
+    frames: np.ndarray = kernels.square_frames(corners)
+    return frames
 
 
 def meet(
