@@ -248,6 +248,38 @@ void place_rivals(count k, const double places[k][2], const double reach[k],
                   const int64_t groups[k], const int64_t numbers[k], const double odds[k],
                   double none, double no_number, double of_groups[k], double of_numbers[k]);
 
+/* square_cells.c */
+
+/* Which quadrilaterals are bright outside and dark inside all sides, at distances from the middle:
+   for a share of places along each, paper is so many times brighter. */
+void dark_inside(count h, count w, count k, count n, const uint8_t gray[h][w],
+                 const double frames[k][3][3], const double along[n], double outside,
+                 double inside, double offset, double times, double share, bool dark[k]);
+/* By how much the log odds of markers of n by n cells grow where a cell is paper, and those where
+   all are ink; those of square corners; which borders are seen at all, and which are whole. A grid
+   has s by s cells, of some size, px, with the border and one more cell of paper around it. Where
+   light is spread, only the darkest part of a cell tells what it is. */
+void cell_evidence(count h, count w, count k, count s, count n, const uint8_t gray[h][w],
+                   const double frames[k][3][3], const double sizes[k][2], const double blurs[k],
+                   const bool spread[k], const double window[s], const double places[5][2],
+                   double offset, double most_mixed, double minimum_step, double of_usual,
+                   double share, double everywhere, double sharpness, double most, double unclear,
+                   const double weights[3], double corner, bool seen[k],
+                   float paper[k][n][n], double odds[3][k], double levels[5][s][s],
+                   double sums[6][3][s]);
+
+/* square_words.c */
+
+/* The likeliest of w words in four turns, its log odds and those of others against it, where they
+   are possible. Words have bits, and a prior against them; few edges speak against them as cells,
+   and corners for them as shapes. */
+void likeliest_words(count k, count c, count b, count w, const float paper[k][c],
+                     const double ink[k], const double square[k], const bool anyway[k],
+                     const uint8_t words[b][w][4], const float prior[w], const double few[w],
+                     const double shapes[w], double doubt, double figures, double possible,
+                     int64_t best[k][2], double total[k], double others[k], bool likely[k],
+                     float sums[b][256], float odds[w][4]);
+
 /* square_prints.c */
 
 /* Prints of k markers of n by n cells, laid over an image from frames and blurs on (the first one,

@@ -86,12 +86,14 @@ class SquareDetector(ExpectingDetector):
         found = [NOTHING]
         for level, half in enumerate(halved(gray, levels)):
             corners = find_quadrilaterals(half)
+            if level:  # where light, a lens or enlargement spreads edges
+                corners = corners[~_are_read(_enlarged(corners, level), Readings.joined(found))]
             small = np.linalg.norm(corners[:, 2] - corners[:, 0], axis=1) < _SMALL
-            if level == 0:
-                corners[small] = lay_outlines(half, corners[small])
-            else:  # where contours do as well, unless light, a lens or enlargement spreads
-                small &= ~_are_read(_enlarged(corners, level), Readings.joined(found))
-                corners = np.concatenate([corners, lay_outlines(half, corners[small])])
+            outlines = lay_outlines(half, corners[small])
+            if level:  # contours may do as well
+                corners = np.concatenate([corners, outlines])
+            else:
+                corners[small] = outlines
             of_half = read(half, corners, groups, expected, everything=everything)
             found.append(replace(of_half, corners=_enlarged(of_half.corners, level)))
         readings = Readings.joined(found)

@@ -17,26 +17,23 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from math import log
+from math import exp, log
 
 import cv2
 import numpy as np
 
+from ahf_ros import kernels
 from ahf_ros.families.square.frames import side_lengths, square_frames
-from ahf_ros.families.square.shapes import corner_odds, parallel_odds
+from ahf_ros.families.square.shapes import parallel_odds
 from ahf_ros.families.words import against as of_expected
 from ahf_ros.prints.square import borders, corner_counts, words
 from ahf_ros.vision.array_record import ArrayRecord
-from ahf_ros.vision.frame import project
 from ahf_ros.vision.logarithm import LOG_OFFSET
-from ahf_ros.vision.normal import normal_integral
-from ahf_ros.vision.sampling import sample
 
 _IN_CELL = ((0.0, 0.0), (-0.2, -0.2), (-0.2, 0.2), (0.2, -0.2), (0.2, 0.2))
 """Where a cell is sampled, from its centre, in cells."""
 
 _CORNER = 0.3  # from a corner of the border, in cells
-_OUTERMOST = (1, 3, 2, 4)  # of the whole cell and its parts, those at the corners
 _BLURS = 0.7, 0.4  # of a usual image and of a sharp one, standard deviations in px
 _SMALL_CELL = 2.0  # below which they differ, px
 _SMALLEST_CELL = 1.0  # that can be read, px
@@ -44,6 +41,7 @@ _LARGE_CELL = 4.0  # whose middle stays dark where light spreads over ink, px
 _SPREADS = 3.0  # logarithmic odds against an image in which it does
 _MOST_MIXED = 0.2  # share that a cell takes from each neighbour, at most
 _REACH = 0.25  # standard deviation of the window that levels are taken from, in sides
+_EVERYWHERE = 1e-6  # weight of all others, if there is none in this window
 _MINIMUM_STEP = 0.35  # from ink to paper, in the logarithm
 _OF_USUAL = 0.4  # minimum of a step of the border, in usual ones
 _SIDE = 0.6  # minimum share of such steps of each side of the border
@@ -94,7 +92,9 @@ class _Evidence:
     """What the cells of quadrilaterals within a border say; k of these, c cells in each."""
 
     quadrilateral: np.ndarray  # (k,), its index
-    paper: np.ndarray  # (k, c), by how much the log odds of a marker grow where a cell is paper
+    paper: (
+        np.ndarray
+    )  # float32, (k, c), by how much the log odds of a marker grow where a cell is paper
     ink: np.ndarray  # (k,), logarithmic odds of a marker where all cells are ink
     square: np.ndarray  # (k,), logarithmic odds of square corners
     whole: np.ndarray  # (k,), whether the border is whole, bool
@@ -157,41 +157,31 @@ def _likely(
     everything: bool,
 ) -> Readings:
     """Return what is likely to be a marker of a group, whose index and border are given."""
-    prints, prior, few, drawn = _table(group)
-    odds = seen.paper @ prints
-    odds -= prior
-    if expected:
-        odds -= np.repeat(of_expected(np.arange(len(prior) // 4), expected), 4)
-    best = odds.argmax(axis=1)
-    of_cells = odds[np.arange(len(best)), best] + seen.ink - _DOUBT - few[best]
-    of_shape = seen.square + drawn[best] - prior[best] - _FIGURES
-    total = -np.logaddexp(-of_cells, -of_shape)
-    likely = np.flatnonzero((total > _POSSIBLE) | everything & seen.whole)
-    odds, best = odds[likely], best[likely]
-    # A turn of the same marker is no other: some are symmetric.
-    number, turn = np.divmod(best, 4)
-    rows = np.arange(len(best))[:, None]
-    odds -= odds[rows, best[:, None]]
-    odds[rows, 4 * number[:, None] + np.arange(4)] = -np.inf
-    second = odds.max(axis=1, initial=-np.inf)
+    bits, prior, few, shapes = _table(group)
+    prior = prior + of_expected(np.arange(len(prior)), expected)
+    of_words = bits, prior, few, shapes, _DOUBT, _FIGURES, _POSSIBLE
+    best, total, others, likely, *_ = kernels.likeliest_words(
+        seen.paper, seen.ink, seen.square, everything & seen.whole, *of_words
+    )
+    number, turn = best[likely].T
     return Readings(
         corners=corners[seen.quadrilateral[likely, None], (np.arange(4) - turn[:, None]) % 4],
-        group=np.full(len(best), index),
+        group=np.full(len(number), index),
         number=number,
-        border=np.full(len(best), border),
+        border=np.full(len(number), border),
         odds=total[likely],
-        others=second + np.log(np.exp(odds - second[:, None]).sum(axis=1)),
+        others=others[likely],
         whole=seen.whole[likely],
     )
 
 
 @lru_cache(maxsize=32)
 def _table(group: tuple[str, ...]) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Return the cells of the markers of dictionaries in four turns, and three terms for each.
+    """Return the bits of the markers of dictionaries in four turns, and three terms for each.
 
     Other markers speak against it, and textures, which have few edges between cells. The third
     term is the logarithmic odds against a figure that has just its corners, each at one of the
-    lines between cells. The shapes are (cells, 4 n) and thrice (4 n,).
+    lines between cells, less the first one. The shapes are (bytes, n, 4) and thrice (n,).
     """
     cells = words(group[-1])
     turned = np.stack([np.rot90(cells, turn, axes=(1, 2)) for turn in range(4)], axis=1)
@@ -201,12 +191,11 @@ def _table(group: tuple[str, ...]) -> tuple[np.ndarray, np.ndarray, np.ndarray, 
     bordered = np.pad(cells, ((0, 0), (1, 1), (1, 1)))
     edges = sum(np.diff(bordered, axis=axis).sum(axis=(1, 2)) for axis in (1, 2))
     usual = cells.shape[1] * (cells.shape[1] + 1)
-    return (
-        turned.reshape(4 * len(cells), -1).T.astype(np.float32),
-        np.log(np.repeat(count, 4)).astype(np.float32),
-        np.repeat(_PLAIN * np.maximum(usual - edges, 0), 4),
-        np.repeat(corner_counts(group[-1]) * log(cells.shape[1] + 1), 4),
-    )
+    others = np.log(count)
+    shapes = corner_counts(group[-1]) * log(cells.shape[1] + 1) - others
+    few = _PLAIN * np.maximum(usual - edges, 0)
+    bits = np.packbits(turned.reshape(*turned.shape[:2], -1), axis=2, bitorder='little')
+    return np.ascontiguousarray(np.moveaxis(bits, 2, 0)), others, few, shapes
 
 
 def _dark_inside(gray: np.ndarray, frames: np.ndarray, depth: float) -> np.ndarray:
@@ -214,19 +203,10 @@ def _dark_inside(gray: np.ndarray, frames: np.ndarray, depth: float) -> np.ndarr
 
     The depth inside is a share of a side.
     """
-    along = np.linspace(-0.45, 0.45, _POINTS)
-    turns = [np.linalg.matrix_power(np.array([[0, -1], [1, 0]]), turn) for turn in range(4)]
-
-    def logs(across: float) -> np.ndarray:
-        side = np.stack([along, np.full(_POINTS, across)], axis=1)
-        points = project(frames, np.stack([side @ turn for turn in turns]))
-        values = sample(gray, points.reshape(len(frames), -1, 2))
-        return np.log(values + LOG_OFFSET).reshape(-1, 4, _POINTS)
-
-    if not len(frames):
-        return np.zeros(0, bool)
-    dark = logs(-0.5 - _DEPTH) - logs(-0.5 + depth) > _MINIMUM_STEP / 2
-    return dark.mean(axis=2).min(axis=1) >= _SIDE
+    places = np.linspace(-0.45, 0.45, _POINTS), 0.5 + _DEPTH, 0.5 - depth
+    numbers = LOG_OFFSET, exp(_MINIMUM_STEP / 2), _SIDE
+    dark: np.ndarray = kernels.dark_inside(gray, frames, *places, *numbers)
+    return dark
 
 
 def _evidence(
@@ -243,99 +223,39 @@ def _evidence(
     once by the darkest part of each, as where light has spread from paper over ink.
     """
     side = cells + 2 * border
-    places = (np.arange(side + 2) - (side + 1) / 2) / side
-    grid = np.stack(np.meshgrid(places, places), axis=-1).reshape(-1, 2)
-    points = project(frames, grid + np.array(_IN_CELL)[:, None] / side)
-    parts = sample(gray, points).astype(np.float64).swapaxes(0, 1)
-    parts = parts.reshape(len(_IN_CELL), len(frames), side + 2, side + 2)
     small = np.flatnonzero(sizes < _SMALL_CELL * side)
     large = np.flatnonzero(sizes >= _LARGE_CELL * side)
     tried = np.concatenate([np.arange(len(frames)), small, large])
-    blurs, spreads = np.repeat(
-        [[*_BLURS, _BLURS[0]], [0.0, 0.0, _SPREADS]], [len(frames), len(small), len(large)], axis=1
+    counts = len(frames), len(small), len(large)
+    blurs = np.repeat([*_BLURS, _BLURS[0]], counts)
+    spread = np.repeat([False, False, True], counts)
+    lengths = side_lengths(corners[tried]) / side
+    reach = (np.arange(side + 2) / (_REACH * (side + 2))) ** 2
+    of_levels = LOG_OFFSET, _MOST_MIXED, _MINIMUM_STEP, _OF_USUAL, _SIDE, _EVERYWHERE
+    weights = np.array([_PART_WEIGHT, _BORDER_WEIGHT, _CORNER_WEIGHT])
+    seen, paper, (ink, square, around), *_ = kernels.cell_evidence(
+        gray,
+        frames[tried],
+        (lengths[:, :2] + lengths[:, 2:]) / 2,
+        blurs,
+        spread,
+        kernels.exponentials(-reach / 2),
+        np.array(_IN_CELL),
+        *of_levels,
+        _SHARPNESS,
+        _COVERED,
+        _UNCLEAR,
+        weights,
+        _CORNER,
+        n=cells,
     )
-    darkest, parts = parts.min(axis=0), parts[1:]
-    whole = parts.mean(axis=0)[tried]
-    whole[spreads > 0] = darkest[large]
-    whole = _unmixed(whole, corners[tried], side, blurs)
-    logs = np.log(parts + LOG_OFFSET).reshape(len(parts), len(frames), -1)[:, tried]
-    values = np.log(np.maximum(whole, 0) + LOG_OFFSET)
-    rings = _rings(cells, border)
-    flat = values.reshape(len(values), -1)
-    ink, paper = flat[:, rings.ink], flat[:, rings.paper]
-    steps = paper - ink
-    usual = np.median(steps, axis=1)[:, None]
-    clear = (steps > _OF_USUAL * usual) & (steps > _MINIMUM_STEP / 2)
-    on_sides = clear.reshape(len(clear), 4, side).mean(axis=2).min(axis=1, initial=1.0)
-    which = np.flatnonzero((usual[:, 0] > _MINIMUM_STEP) & (on_sides >= _SIDE))
-    ink, paper, clear = ink[which], paper[which], clear[which]
-    total = clear @ rings.weights
-    middle = (clear * (ink + paper) / 2) @ rings.weights / total
-    step = (clear * (paper - ink)) @ rings.weights / total
-    levels = np.concatenate([flat[None, which], logs[:, which]])
-    odds = np.clip(_SHARPNESS * (levels - middle) / step, -_COVERED, _COVERED)
-    weights = np.array([1.0, *[_PART_WEIGHT] * len(parts)])
-    against = np.einsum('p,pkc->kc', weights, log(2) - np.logaddexp(0, odds))
-    against -= _UNCLEAR * (1 - np.abs(odds[0]) / _COVERED)
-    around = _BORDER_WEIGHT * against[:, rings.border].sum(axis=1)
-    around += _CORNER_WEIGHT * against[:, rings.corners].sum(axis=1)
-    paper = np.einsum('p,pkc->kc', weights, odds)[:, rings.inside]
-    inside = against[:, rings.inside].sum(axis=1) + around
-    middle, step = middle[:, rings.corners], step[:, rings.corners]
-    outermost = levels[_OUTERMOST, :, rings.corners].T
-    bright = (np.exp(outermost - middle) - np.exp(-step / 2)) / (2 * np.sinh(step / 2))
-    depths = _CORNER * _cell_sizes(corners[tried[which]], side) / blurs[which, None]
-    square = np.clip(corner_odds(bright, depths, _SHARPNESS), -_COVERED, _COVERED).sum(axis=1)
-    rare = spreads[which]
+    which = np.flatnonzero(seen)
+    rare = _SPREADS * spread[which]
     whole = (around > _WHOLE) & (square > 0)
-    paper = paper.astype(np.float32)
-    return _Evidence(tried[which], paper, inside - rare, square - rare, whole)
-
-
-@dataclass(frozen=True, slots=True)
-class _Rings:
-    ink: np.ndarray  # (4 m,), outermost cells of the border, side by side
-    paper: np.ndarray  # (4 m,), the cells beside them
-    border: np.ndarray  # the cells of the border, each once
-    corners: np.ndarray  # those at the corners, which round and tattered regions do not have
-    inside: np.ndarray  # the other cells
-    weights: np.ndarray  # (4 m, n), of the cells of the border for the levels of all cells
-
-
-@lru_cache
-def _rings(cells: int, border: int) -> _Rings:
-    """Return the indices of cells in the grid of a marker, border and one more ring included."""
-    size = cells + 2 * border + 2
-    index = np.arange(size**2).reshape(size, size)
-    turned = [np.rot90(index, turn) for turn in range(4)]
-    ink = np.concatenate([of[1, 1:-1] for of in turned])
-    paper = np.concatenate([of[0, 1:-1] for of in turned])
-    rows, columns = np.divmod(index.ravel(), size)
-    squares = np.subtract.outer(rows[ink], rows) ** 2.0
-    squares += np.subtract.outer(columns[ink], columns) ** 2.0
-    weights = np.exp(-squares / (2 * (_REACH * size) ** 2)) + 1e-6
-    corners = index[[1, 1, -2, -2], [1, -2, 1, -2]]
-    inside = index[border + 1 : -border - 1, border + 1 : -border - 1].ravel()
-    around = np.setdiff1d(index[1:-1, 1:-1], inside)
-    return _Rings(ink, paper, around, corners, inside, weights)
-
-
-def _cell_sizes(corners: np.ndarray, side: int) -> np.ndarray:
-    """Return the width and the height of cells, mean of opposite sides, px, shape (k, 2)."""
-    lengths = side_lengths(corners) / side
-    return (lengths[:, :2] + lengths[:, 2:]) / 2
-
-
-def _unmixed(values: np.ndarray, corners: np.ndarray, side: int, blurs: np.ndarray) -> np.ndarray:
-    """Return the gray values of cells, shape (k, n, n), without what blurs mixed into them."""
-    count = values.shape[1]
-    neighbours = np.eye(count, k=1) + np.eye(count, k=-1)
-    neighbours[0, 0] = neighbours[-1, -1] = 1
-    across, down = (normal_integral(-of / blurs / 2) for of in _cell_sizes(corners, side).T)
-    mixed = [
-        np.eye(count)
-        + np.minimum(of, _MOST_MIXED)[:, None, None] * (neighbours - 2 * np.eye(count))
-        for of in (across, down)
-    ]
-    along_columns = np.linalg.solve(mixed[1], values)
-    return np.linalg.solve(mixed[0], along_columns.transpose(0, 2, 1)).transpose(0, 2, 1)
+    return _Evidence(
+        tried[which],
+        paper[which].reshape(-1, cells**2),
+        ink[which] - rare,
+        square[which] - rare,
+        whole[which],
+    )

@@ -10,7 +10,6 @@ from __future__ import annotations
 import numpy as np
 
 from ahf_ros.vision.frame import local_affine
-from ahf_ros.vision.normal import normal_integral
 
 _CORNER_ERROR = 1.0  # of the lengths of opposite sides, as corners are known to half a pixel, px
 _FOCAL_LENGTH = 1.0  # about that of a camera, in image widths
@@ -27,19 +26,3 @@ def parallel_odds(frames: np.ndarray, width: int) -> np.ndarray:
     usual = _CORNER_ERROR / smallest + largest / (_FOCAL_LENGTH * width)
     relative = np.linalg.norm(frames[:, 2, :2], axis=1) / usual
     return -np.minimum(relative**2 / 2, _CONVERGING)
-
-
-def corner_odds(levels: np.ndarray, depths: np.ndarray, sharpness: float) -> np.ndarray:
-    """Return the logarithmic odds of square corners against round ones, of the shape of levels.
-
-    Parameters
-    ----------
-    levels : ndarray of float64, shape (k, 4)
-        Gray values inside the corners, 0 where it is as dark as ink, 1 where as bright as paper.
-    depths : ndarray of float64, shape (k, 2)
-        Distances of these places from the two sides, in standard deviations of the blur.
-    sharpness : float
-        Inverse of the variance of a level.
-    """
-    blurred = 1 - normal_integral(depths).prod(axis=1, keepdims=True)
-    return sharpness * (1 - blurred) * ((1 + blurred) / 2 - levels)
