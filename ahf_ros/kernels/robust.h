@@ -70,12 +70,6 @@ static inline double median(count n, const double values[n], const bool selected
     return some ? ranked(some, scratch, (some - 1) / 2) : empty;
 }
 
-/* The median of at least one value, the mean of two if their number is even. */
-static inline double middle(count n, double values[n])
-{
-    return (ranked(n, values, (n - 1) / 2) + ranked(n, values, n / 2)) / 2;
-}
-
 /* Solve a x = b by elimination with pivots; b becomes x. */
 static inline void solve(count n, count m, double a[n][n], double b[n][m])
 {
