@@ -30,7 +30,8 @@ void logarithms_f(count n, const float x[n], float y[n]);
 
 void circle_values(count h, count w, count k, count r, count m, const float image[h][w],
                    const double frames[k][3][3], const double directions[2][m],
-                   const double radii[k][r], float values[k][r][m], double reach[k][m]);
+                   const double radii[k][r], const float lift[k], float values[k][r][m],
+                   double reach[k][m]);
 void second_differences(count h, count w, count k, count m, const float image[h][w],
                         const double frames[k][3][3], const double points[2][m], double medians[k],
                         double scratch[m]);

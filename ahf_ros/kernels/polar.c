@@ -51,17 +51,19 @@ static inline void project(count n, const double frame[3][3], const double *x, c
     }
 }
 
-/* Gray values of an image between pixels, at m directions on r circles about k targets, the
-   innermost first; beyond the border the nearest pixel counts. The image shows all of a target, or
-   a direction of it up to a radius. */
+/* Gray values of an image between pixels, in a range that begins at `lift` instead of at 0, at m
+   directions on r circles about k targets, the innermost first; beyond the border the nearest pixel
+   counts. The image shows all of a target, or a direction of it up to a radius. */
 void circle_values(count h, count w, count k, count r, count m, const float image[h][w],
                    const double frames[k][3][3], const double directions[2][m],
-                   const double radii[k][r], float values[k][r][m], double reach[k][m])
+                   const double radii[k][r], const float lift[k], float values[k][r][m],
+                   double reach[k][m])
 {
     places at;
     float along[3][POINTS], centre[3], until[POINTS];
     count right = w > 1, below = h > 1;
-    for (count b = 0; b < k; b++)
+    for (count b = 0; b < k; b++) {
+        float range = 1 - lift[b] / 255;
         for (count start = 0; start < m; start += POINTS) {
             count n = m - start < POINTS ? m - start : POINTS;
             project(n, frames[b], &directions[0][start], &directions[1][start], along, centre);
@@ -75,7 +77,8 @@ void circle_values(count h, count w, count k, count r, count m, const float imag
                     count left = at.left[a], next = left + right;
                     float over = upper[left] + at.across[a] * (upper[next] - upper[left]);
                     float under = lower[left] + at.across[a] * (lower[next] - lower[left]);
-                    values[b][j][start + a] = over + at.down[a] * (under - over);
+                    float value = greater_f(over + at.down[a] * (under - over), 0);
+                    values[b][j][start + a] = lift[b] + range * value;
                 }
                 for (count a = 0; a < n; a++)
                     until[a] = at.outside[a] == 0 ? until[a] : lesser_f(until[a], before);
@@ -83,6 +86,7 @@ void circle_values(count h, count w, count k, count r, count m, const float imag
             for (count a = 0; a < n; a++)
                 reach[b][start + a] = until[a];
         }
+    }
 }
 
 /* The median size, at m points of targets, of the second difference of rows of the second difference

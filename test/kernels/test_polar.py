@@ -5,6 +5,8 @@ import pytest
 
 from ahf_ros import kernels
 
+LIFT = np.float32([0, 40, 80])
+
 
 def at(image: np.ndarray, x: float, y: float) -> float:
     """Return the gray value between pixels, of the nearest one beyond the border."""
@@ -21,19 +23,20 @@ def at(image: np.ndarray, x: float, y: float) -> float:
 @pytest.mark.parametrize('seed', range(3))
 def test_circles_are_sampled_between_pixels(seed: int, shape: tuple[int, int]) -> None:
     generator = np.random.default_rng(seed)
-    image = generator.uniform(0, 255, shape).astype(np.float32)
+    image = generator.uniform(-5, 255, shape).astype(np.float32)
     frames = np.tile(np.eye(3), (3, 1, 1)) + generator.normal(0, 0.003, (3, 3, 3))
     frames[:, :2, :2] *= 6
     frames[:, :2, 2] = generator.uniform(0, 30, (3, 2))
     angles, radii = np.arange(70) / 70 * 2 * np.pi, np.sort(generator.uniform(0, 2, (3, 4)))
     directions = np.array([np.cos(angles), np.sin(angles)])
-    values, reach = kernels.circle_values(image, frames, directions, radii)
+    values, reach = kernels.circle_values(image, frames, directions, radii, LIFT[:3])
     for b in range(3):
         for a in range(70):
-            shown = np.inf
+            lift, shown = LIFT[b], np.inf
             for j, radius in enumerate(radii[b]):
                 x, y, scale = frames[b] @ [*(radius * directions[:, a]), 1]
-                assert values[b, j, a] == pytest.approx(at(image, x / scale, y / scale), abs=0.05)
+                value = lift + (1 - lift / 255) * max(at(image, x / scale, y / scale), 0)
+                assert values[b, j, a] == pytest.approx(value, abs=0.05)
                 inside = 0 <= x / scale <= shape[1] - 1 and 0 <= y / scale <= shape[0] - 1
                 if not inside and np.isinf(shown):
                     shown = radii[b, j - 1] if j else 0.0
@@ -82,7 +85,9 @@ def test_no_value_leads_beyond_an_image(value: float) -> None:
     image, frames = np.ones((3, 4), np.float32), np.full((1, 3, 3), value)
     directions, radii = np.ones((2, 5)), np.ones((1, 2))
     for shape in ((1, 1), (3, 4)):
-        values, _ = kernels.circle_values(image[: shape[0], : shape[1]], frames, directions, radii)
+        values, _ = kernels.circle_values(
+            image[: shape[0], : shape[1]], frames, directions, radii, LIFT[:1]
+        )
         assert (values == 1).all()
         sizes, _ = kernels.second_differences(image[: shape[0], : shape[1]], frames, directions)
         assert sizes.tolist() == [0]

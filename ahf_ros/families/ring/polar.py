@@ -189,11 +189,8 @@ def polar_images(
     inner, outer = band
     outermost = outer + _MARGIN
     radii = np.linspace(INNERMOST, outermost, circles)
-    values, reach = _on_circles(
-        gray, dots, angles_of(count), np.tile(radii, (len(dots.frames), 1))
-    )
     contrast, lift = _appearance(gray, dots, band)
-    values = lifted(values, lift.astype(np.float32)[:, None, None])
+    values, reach = on_circles(gray, dots.frames, angles_of(count), radii, lift)
     places = [*(1 + (inner - 1) * GAP), *(outer + MARGIN)]
     ground = values[:, [np.abs(radii - place).argmin() for place in places]]
     apart = 2 * np.pi * inner * dots.size / count
@@ -218,21 +215,22 @@ def polar_images(
     )
 
 
-def _on_circles(
-    gray: np.ndarray, dots: Fit, angles: np.ndarray, radii: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return gray values, not below 0, on circles of radii (k, n) at angles (m,), (k, n, m).
-
-    With them comes up to which of the radii the image shows targets at angles, (k, m).
-    """
-    directions = np.array([np.cos(angles), np.sin(angles)])
-    values, reach = kernels.circle_values(gray, dots.frames, directions, radii)
-    return np.maximum(values, 0, out=values), reach
-
-
 def angles_of(count: int) -> np.ndarray:
     """Return the angles at which bands are read, counter-clockwise as seen, rad, (count,)."""
     return -2 * np.pi * (np.arange(count) + 0.5) / count
+
+
+def on_circles(
+    gray: np.ndarray, frames: np.ndarray, angles: np.ndarray, radii: np.ndarray, lift: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return gray values on circles about targets, whose black is lifted, (k, n, m).
+
+    With them comes up to which of the radii, ascending and of shape (n,) or (k, n), the image shows
+    targets at angles, (k, m).
+    """
+    directions = np.array([np.cos(angles), np.sin(angles)])
+    radii = np.broadcast_to(radii, (len(frames), radii.shape[-1]))
+    return kernels.circle_values(gray, frames, directions, radii, lift.astype(np.float32))
 
 
 def _appearance(
@@ -250,7 +248,8 @@ def _appearance(
     radius = 1 + dots.polarity * dots.edge_shift / dots.size
     beside = radius[:, None] * _LEVELS
     ground = np.broadcast_to(outer + MARGIN, (len(radius), len(MARGIN)))
-    values, _ = _on_circles(gray, dots, angles, np.hstack([beside, ground]))
+    at = angles, np.hstack([beside, ground]), np.zeros(len(radius))
+    values, _ = on_circles(gray, dots.frames, *at)
     inside, outside, *beyond = np.maximum(values, _MINIMUM_LEVEL).swapaxes(0, 1)
     deep, near = normal_integral((radius[:, None] - beside) * (dots.size / dots.blur)[:, None]).T
     by_levels, bare = (
