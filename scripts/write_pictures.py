@@ -27,7 +27,7 @@ from ahf_ros.families.ring.likelihood import (
     edge_evidence,
     level_evidence,
 )
-from ahf_ros.families.ring.polar import angles_of, polar_images
+from ahf_ros.families.ring.polar import angles_of, on_circles, polar_images
 from ahf_ros.identification.filtering.homomorphic import HomomorphicFilter
 from ahf_ros.prints.designs import contours
 from ahf_ros.prints.families import print_in
@@ -203,7 +203,7 @@ def light() -> Figure:
     row = (np.arctan2(y, x) + np.pi) / (2 * np.pi) * (len(angles) - 1)
     column = np.hypot(x, y) / reach * (len(radii) - 1)
     places = column.astype(np.float32), row.astype(np.float32)
-    known = cv2.remap(polar, *places, cv2.INTER_LINEAR)
+    known = cv2.remap(polar.T, *places, cv2.INTER_LINEAR)
     outside = np.hypot(x, y) > reach
     figure, panels = _panels(1, 3, 3.0, 3.2)
     for panel, values, brightest, title in (
@@ -241,7 +241,7 @@ def _evidence(gray: np.ndarray, best: Hypotheses) -> tuple[Evidence, Words]:
     growth = best.polarity * best.edge_shift / dot.size
     edges = edge_evidence(polar, np.ones(1), growth, TABLE.band)
     radii = np.array([0.3, 0.6, 1.5, 1.8, 2.5, 2.75, 3.0, 3.25, 3.8, 4.1])
-    levels = sample_circles(gray, best.frames, angles, radii)
+    levels, _ = on_circles(gray, best.frames, angles, radii, polar.lift)
     known = predicted_light(gray, best.frames, polar.lift, angles, radii, TABLE.band)
     evidence = edges.plus(level_evidence(polar, levels, *known, radii, growth, TABLE.band))
     return evidence, decode(evidence, 0 * growth, TABLE)

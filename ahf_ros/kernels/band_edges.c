@@ -4,10 +4,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "elementary.h"
-#include "kernels.h"
-
-static const float NEVER_SEEN = 1e9f; /* more than any gray value, or radius */
+#include "band_looks.h"
 
 /* The circle of c below a radius, and how far that is from there to the next one. */
 static inline count circle_below(count c, double innermost, double outermost, double radius,
@@ -38,47 +35,6 @@ void gray_at(count k, count i, count c, count m, count r, count g, const float g
                 values[b][j][a] = below[a] * (1 - share) + above[a] * share;
             }
         }
-}
-
-/* Numbers that decide, in the order of likelihood.py. */
-typedef struct {
-    double innermost, offset, white; /* circle; gray values */
-    double beside, soft, least_beside, most_beside, across[2]; /* where readings are */
-    double light_edge, least_doubt, most_doubt, marked_share;
-    double flat, flat_white, mark, tail, share, any, plain, at_ends; /* of steps of ln */
-} numbers;
-
-/* How a target looks: circle, px, gray values; what of it is drawn. */
-typedef struct {
-    double outermost, size, blur, polarity, contrast, noise, shade, glare;
-} target;
-
-/* Ink over paper, how white ink is, and how steps of ln are spread, in one target. */
-typedef struct {
-    float ink, offset, white, white_ink, glare, told_below;
-    float flat, of_white, mark, tail, share, noise, plain, any, doubt, at_ends;
-} look;
-
-static inline look look_of(const numbers *of, const target *it, float doubt)
-{
-    bool dark = it->polarity > 0;
-    float contrast = (float)it->contrast, white = (float)of->white;
-    /* White paper may be ink under glare, but white ink on dark ground is ink. */
-    return (look){.ink = dark ? contrast : 1 / contrast, .offset = (float)of->offset,
-                  .white = white, .white_ink = dark ? NEVER_SEEN : white,
-                  .glare = (float)it->glare,
-                  .told_below = !dark || it->glare > NEVER_SEEN ? NEVER_SEEN : white,
-                  .flat = (float)of->flat,
-                  .of_white = (float)(it->glare <= of->white ? of->flat_white : of->flat),
-                  .mark = (float)of->mark, .tail = (float)of->tail, .share = (float)of->share,
-                  .noise = (float)it->noise, .plain = (float)of->plain, .any = (float)of->any,
-                  .doubt = doubt, .at_ends = greater_f(doubt, (float)of->at_ends)};
-}
-
-/* Share of ink at a distance from the edge that blur made of it, in deviations. */
-static inline double blurred(double distance)
-{
-    return distance > 6 ? 1 : distance < -6 ? 0 : normal_share(distance);
 }
 
 /* What is read at an edge of a band, on ground and on the band: gray values; shares of ink that
@@ -153,18 +109,6 @@ static void read_edges(count c, count m, const float image[c][m], const numbers 
     }
 }
 
-/* Gray value of paper of which a share is ink, where ground of which another share is ink is seen.
-   Ink that would be brighter than white is as bright as what is `seen` if that is white. */
-static inline float printed(look of, float ground, float of_ground, float share, float seen)
-{
-    float paper = ground / (1 + of_ground * (of.ink - 1)), ink = paper * of.ink;
-    float bounded = lesser_f(ink, seen);
-    ink = seen >= of.white_ink ? bounded : ink;
-    return paper + share * (ink - paper);
-}
-
-static inline float raised(look of, float gray) { return greater_f(gray, 0) + of.offset; }
-
 /* Probability of an edge of light between neighbours, as two circles in the gap show it. */
 static double light_edges(count c, count m, const float image[c][m], const numbers *of,
                           const target *it, const double edges[3])
@@ -190,12 +134,6 @@ static double light_edges(count c, count m, const float image[c][m], const numbe
         edge_count += step * step > noisy ? 1.0f : 0.0f;
     }
     return lesser(greater(edge_count / (double)m, of->least_doubt), of->most_doubt);
-}
-
-/* Log odds of a density, unless light that nothing predicts is there. */
-static inline float log_odds(look of, float density, float doubt, float anything)
-{
-    return logarithm_f(((1 - doubt) * density + doubt * of.any) / anything);
 }
 
 /* How steps of ln at an edge are spread: density of anything; the step of a mark; deviation of
@@ -345,7 +283,7 @@ static void covered_ground(count m, count n, look of, float shade, float light_e
 void edge_evidence(count k, count i, count c, count m, count n, const float gray[i][c][m],
                    const int64_t row[k], const double reach[k][m], const double plate[k][m],
                    const double looks_of[k][8], const double edges[k][3], const float weight[k],
-                   const float shares[n], const double deciding[21], float looks[k][2][n][m],
+                   const float shares[n], const double deciding[24], float looks[k][2][n][m],
                    float typical[k][2][2][m], bool covered[k][2][m], float lit[k],
                    float read[2][7][m], float steps[7][m])
 {
@@ -372,7 +310,7 @@ void edge_evidence(count k, count i, count c, count m, count n, const float gray
 void shifted_evidence(count k, count i, count c, count m, count s, const float gray[i][c][m],
                       const int64_t row[k], const double reach[k][m], const double plate[k][m],
                       const double looks_of[k][8], const double edges[k][s][3],
-                      const float weight[k], const double deciding[21], float looks[k][s][2][m],
+                      const float weight[k], const double deciding[24], float looks[k][s][2][m],
                       float read[2][7][m], float steps[7][m], float of_edges[2][2][m])
 {
     static const float shares[2] = {0, 1};

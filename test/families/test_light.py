@@ -32,7 +32,7 @@ LIGHTS = {
 
 
 def predicted(light: np.ndarray, contrast: float = 0.25) -> tuple[np.ndarray, np.ndarray]:
-    """Return the errors of predicted light on a target, of ln, and how far it is known, (m, d)."""
+    """Return the errors of predicted light on a target, of ln, and how far it is known, (d, m)."""
     away = np.hypot(X - CENTRE, Y - CENTRE) / RADIUS
     sector = np.arctan2(Y - CENTRE, X - CENTRE) // (np.pi / 6)
     inked = (away < 1) | ((away > BAND[0]) & (away < BAND[1]) & (sector % 2 == 0))
@@ -43,7 +43,7 @@ def predicted(light: np.ndarray, contrast: float = 0.25) -> tuple[np.ndarray, np
     frames = affine_frames([CENTRE], [CENTRE], [RADIUS], [RADIUS], [0.0])
     found, spread = predicted_light(shown, frames, np.zeros(1), ANGLES, RADII, BAND)
     x, y = (
-        (CENTRE + RADIUS * np.outer(of(ANGLES), RADII)).astype(np.float32)
+        (CENTRE + RADIUS * np.outer(RADII, of(ANGLES))).astype(np.float32)
         for of in (np.cos, np.sin)
     )
     truth = cv2.remap(paper, x, y, cv2.INTER_LINEAR)
@@ -88,4 +88,4 @@ def test_targets_do_not_touch_each_other() -> None:
         alone = predicted_light(gray, frames[one], lift[one], ANGLES, RADII, BAND)
         assert together[0][one] == pytest.approx(alone[0], rel=1e-3)
     none = predicted_light(gray, frames[:0], lift[:0], ANGLES, RADII, BAND)
-    assert none[0].shape == none[1].shape == (0, 60, 5)
+    assert none[0].shape == none[1].shape == (0, 5, 60)

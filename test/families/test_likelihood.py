@@ -163,7 +163,7 @@ def by_levels(
 ) -> Evidence:
     """Return what levels say under light of a known spread; None: light as it is seen."""
     radii = np.array([0.5, 1.6, 2.6, 3.1, 3.9])
-    values = np.stack([of.at(np.array([[[radius]]]))[:, 0] for radius in radii], axis=2)
+    values = of.at(radii[None, :, None])
     known = values if light is None else np.full_like(values, light)
     known = known, np.full_like(values, spread)
     return level_evidence(of, values, *known, radii, NONE, BAND, shares)
@@ -197,8 +197,8 @@ def test_a_stretch_in_light_that_nothing_predicts_says_nothing() -> None:
 
 
 def test_what_is_as_dark_as_ink_behind_a_plate_predicts_no_light_on_it() -> None:
-    shadow = np.full((ANGLES, 5), 200.0)
-    shadow[12:24, 2] = 60.0  # in the band, and neither in the gap nor beyond
+    shadow = np.full((5, ANGLES), 200.0)
+    shadow[2, 12:24] = 60.0  # in the band, and neither in the gap nor beyond
     evidence = by_levels(polar(), shadow)
     marked = MARKED[12:24]
     assert marked.any() and (evidence.paper < evidence.ink + 0.5)[0, :, 12:24][:, marked].all()

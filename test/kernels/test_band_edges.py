@@ -60,6 +60,7 @@ LIMITS = {
     **{'edge': 0.3, 'least doubt': 0.05, 'most doubt': 0.5, 'marked': 0.2},
     **{'flat': FLAT, 'flat white': FLAT_WHITE, 'mark': MARK, 'tail': TAIL, 'share': SHARE},
     **{'any': ANY, 'plain': PLAIN, 'at ends': AT_ENDS},
+    **{'of levels, paper': 0, 'ink': 0, 'unlikely': 0},
 }
 DECIDING = np.array(list(LIMITS.values()))
 OUTERMOST, CIRCLES, ANGLES = 4.0, 30, 8

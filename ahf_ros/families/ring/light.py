@@ -50,11 +50,11 @@ def predicted_light(
     paper, between the radii of a `plate`, shape (k, 2, m), see `PolarImages.rim`, that paper is as
     bright as the ground over its `contrast`, shape (k,). The second array is the standard
     deviation of the logarithm of the first, infinite where no ground predicts it; both are
-    float32, (k, m, d).
+    float32, (k, d, m).
     """
     points, ground, candidates, order, compared = _geometry(band, circles)
     place = _places(band[1] + _MARGIN, angles, radii)
-    shape = len(frames), len(angles), len(radii)
+    shape = len(frames), len(radii), len(angles)
     light, spread = np.empty(shape, np.float32), np.empty(shape, np.float32)
     for start in range(0, len(frames), _PART):
         part = slice(start, start + _PART)
@@ -179,10 +179,10 @@ def _turned(of_shifts: np.ndarray) -> np.ndarray:
 def _places(
     reach: float, angles: np.ndarray, radii: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the indices of cells at points, and how far down and across each lies, (m, d)."""
+    """Return the indices of cells at points, and how far down and across each lies, (d, m)."""
     unit = _CELLS / (2 * reach)
     across, down = (
-        np.outer(of(angles), radii) * unit + (_CELLS - 1) / 2 for of in (np.cos, np.sin)
+        np.outer(radii, of(angles)) * unit + (_CELLS - 1) / 2 for of in (np.cos, np.sin)
     )
     row, column = down.astype(np.intp), across.astype(np.intp)
     return row * _TRANSFORM + column, down - row, across - column
@@ -191,7 +191,7 @@ def _places(
 def _read(
     images: np.ndarray, place: np.ndarray, down: np.ndarray, across: np.ndarray
 ) -> np.ndarray:
-    """Return the interpolated values of images (k, n, n) at places, shape (k, m, d)."""
+    """Return the interpolated values of images (k, n, n) at places, shape (k, d, m)."""
     values = images.reshape(len(images), -1)
     below = place + _TRANSFORM
     upper, lower = (

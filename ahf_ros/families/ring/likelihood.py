@@ -25,8 +25,6 @@ from ahf_ros.vision.array_record import ArrayRecord
 from ahf_ros.vision.circle_fit import SOFT
 from ahf_ros.vision.image import SATURATED
 from ahf_ros.vision.logarithm import LOG_OFFSET
-from ahf_ros.vision.normal import normal_integral
-from ahf_ros.vision.robust import medians
 
 _BESIDE = 2.6  # distance of a reading from an edge that is sharp, px
 _MINIMUM_BESIDE, _MAXIMUM_BESIDE = 0.13, 0.36  # bounds of that distance, dot radii
@@ -59,6 +57,7 @@ _DECIDING = np.array(
         *(_BESIDE, SOFT, _MINIMUM_BESIDE, _MAXIMUM_BESIDE, *_ACROSS),
         *(LIGHT_EDGE, *SURPRISES, _MARKED),
         *(_FLAT, _WHITE, _MARK, _MARK_TAIL, _SHARE, _ANY, _PLAIN, _AT_ENDS),
+        *(_PAPER_LEVEL, _INK_LEVEL, _UNLIKELY),
     ]
 )
 
@@ -210,31 +209,9 @@ def _on_circles(polar: PolarImages) -> tuple[np.ndarray, ...]:
     return polar.gray, polar.row, polar.reach, polar.plate, looks
 
 
-def _blurred(
-    polar: PolarImages,
-    at: np.ndarray,
-    inner: np.ndarray | float,
-    outer: np.ndarray | float,
-) -> np.ndarray:
-    """Return the shares of ink that blur leaves or brings at radii (k, r, m) of a ring.
-
-    The radii of the ring are (k, m), too, or (k, 1).
-    """
-    deviation = (polar.blur / polar.size)[:, None, None]
-    below, above = (
-        normal_integral((np.atleast_2d(of)[:, None] - at) / deviation) for of in (inner, outer)
-    )
-    return np.asarray(above - below).astype(np.float32)
-
-
 def _blur_along(polar: PolarImages, band: tuple[float, float]) -> np.ndarray:
     """Return the blur of ends of arcs, standard deviations in angles, shape (k,)."""
     return np.asarray(polar.blur / (np.pi * sum(band) * polar.size / polar.gray.shape[2]))
-
-
-def _gain(paper: np.ndarray, ink: np.ndarray) -> np.ndarray:
-    """Return how much larger an error of paper is in the ink that is expected of it, of ln."""
-    return (ink / np.maximum(paper, 1)) * (paper + LOG_OFFSET) / (ink + LOG_OFFSET)
 
 
 def level_evidence(
@@ -249,67 +226,22 @@ def level_evidence(
 ) -> Evidence:
     """Return the evidence of levels in dots and bands, and beside these, under predicted light.
 
-    Gray values `levels`, shape (k, m, d), were read at radii (d,): in the dot, in the gap, in the
+    Gray values `levels`, shape (k, d, m), were read at radii (d,): in the dot, in the gap, in the
     band or beyond it. `light` and `spread`, as `predicted_light` gives them, are what paper has
     there and the deviation of its logarithm. Of `polar` only the looks of ink and of edges are
     used. The growth of the dots' colour, (k,), is in units of the radii.
     """
-    level, noise = polar.logs(levels)
-    known = np.isfinite(spread)
-    inner, outer = band
-    in_dot, in_band = radii < 1, (radii > inner) & (radii < outer)
-    edges = (of[:, None] for of in band_edges(np.ones(len(growth)), growth, band))
-    share = np.where(in_dot, 1, _blurred(polar, radii[None, :, None], *edges)[..., 0])[:, None]
-    spread, inked = np.where(known, spread, 1), polar.printed(light, share, levels)
-    of_paper = np.sqrt(_PAPER_LEVEL**2 + noise**2 + spread**2)
-    of_ink = np.sqrt(_INK_LEVEL**2 + noise**2 + (spread * _gain(light, inked)) ** 2)
-    of_light, of_inked = polar.levels(light), polar.levels(inked)
-    errors = level - of_light
-    densities = [normal(errors, of_paper), normal(level - of_inked, of_ink)]
-    of_share = np.sqrt(of_ink**2 + (_SHARE * (of_inked - of_light)) ** 2)
-    for of_mark in shares:
-        mixed = polar.levels(polar.printed(light, share * np.float32(of_mark), levels))
-        densities.append(normal(level - mixed, of_share))
-    anything = _PLAIN * densities[0] + (1 - _PLAIN) * _ANY
+    edges = np.stack(band_edges(np.ones(len(growth)), growth, band), axis=1)
     depth = np.minimum(_DEPTH * polar.size / CORRELATION, 1)
-    weight = (weights(polar) * depth).astype(np.float32)
-    limit = polar.glare[:, None, None]
-    reach = np.minimum(polar.reach, polar.rim(outer)[:, 0])
-    seen = known & polar.tells(levels) & (radii <= reach[..., None])
-    on_ground = ~in_dot & ~in_band
-    middle = (inner + outer) / 2
-    halves = (radii > 1) & (radii < middle), radii > middle
-    for half in halves:
-        seen[..., half] &= ~(levels[..., half & on_ground] >= limit).any(axis=2, keepdims=True)
-    dark = levels <= polar.shade[:, None, None]
-    surprise = _surprise(errors, of_paper, seen & on_ground)
-    as_ink = _as_ink(polar, level, noise, of_light, [half & on_ground for half in halves])
-    surprise_at = np.maximum(surprise, np.where(in_band, as_ink, 0))
-    paper, ink, *between = (
-        np.where(seen, np.log(((1 - surprise_at) * of + surprise_at * _ANY) / anything), 0)
-        * weight[:, None, None]
-        for of in densities
+    weight, every = (weights(polar) * depth).astype(np.float32), np.array([0, *shares, 1])
+    reach = np.minimum(polar.reach, polar.rim(band[1])[:, 0])
+    *_, looks_of = _on_circles(polar)
+    looks, dot, lit, covered, *_ = kernels.level_evidence(
+        *(levels, light, spread, radii, band, edges, reach, looks_of, weight, every, _DECIDING)
     )
-    ground = [paper[..., half & on_ground].sum(axis=2) for half in halves]
-    beside = list(zip(halves, ground, strict=True))
-    of_halves = np.stack(
-        [
-            np.stack(
-                [of[..., half & in_band].sum(axis=2) + below for half, below in beside], axis=1
-            )
-            for of in (paper, *between, ink)
-        ]
-    )
-    of_halves *= _predicted(of_halves.max(axis=0), weight)
-    return Evidence(
-        looks=np.moveaxis(of_halves, 0, 2),
-        typical=np.zeros((len(level), 2, 2, level.shape[1]), np.float32),
-        weight=weight,
-        dot=(ink - paper)[..., in_dot].sum(axis=(1, 2)),
-        lit=surprise[:, 0, 0].astype(np.float32),
-        covered=np.stack([dark[..., half & on_ground].any(axis=2) for half in halves], axis=1),
-        blur=_blur_along(polar, band),
-    )
+    looks *= _predicted(looks.max(axis=2), weight)[:, :, None]
+    typical = np.zeros((*looks.shape[:2], 2, looks.shape[3]), np.float32)
+    return Evidence(looks, typical, weight, dot, lit, covered, _blur_along(polar, band))
 
 
 def _predicted(best: np.ndarray, weight: np.ndarray) -> np.ndarray:
@@ -323,40 +255,6 @@ def _predicted(best: np.ndarray, weight: np.ndarray) -> np.ndarray:
     further = np.repeat(np.float32(_FURTHER) * weight, best.shape[1])
     of_paths = best.reshape(-1, best.shape[2]), further, -math.log(SURPRISES[0])
     return kernels.predicted_angles(*of_paths)[0].reshape(best.shape)
-
-
-def _as_ink(
-    polar: PolarImages,
-    level: np.ndarray,
-    noise: np.ndarray,
-    light: np.ndarray,
-    sides: Sequence[np.ndarray],
-) -> np.ndarray:
-    """Return the probabilities that predicted light, of ln (k, m, d), is dark ground, (k, m, d).
-
-    The sides, (d,) each, are of gap and margin. A plate may end beside the band. Where all ground
-    next to the band is evenly lit, light that looks like ink between two readings of it comes from
-    what lies behind the plate.
-    """
-    gap, beyond = np.flatnonzero(sides[0]), np.flatnonzero(sides[1])[:1]
-    if not gap.size:  # further circles fill it
-        return np.zeros_like(level)
-    near = np.append(gap, beyond)
-    ground, width = (of[..., near].reshape(len(of), -1) for of in (level, noise))
-    apart = np.abs(ground - medians(ground)[:, None])
-    uneven = (apart**2 > LIGHT_EDGE**2 + 4 * width**2).mean(axis=1)
-    even = SURPRISES[0] / np.clip(uneven, *SURPRISES).astype(np.float32)[:, None, None]
-    of_gap = level[..., gap].mean(axis=2, keepdims=True)
-    between = np.abs(level[..., beyond] - of_gap) < LIGHT_EDGE
-    dark = (of_gap - light) * polar.polarity[:, None, None] > LIGHT_EDGE
-    return np.where(between & dark, even, 0)
-
-
-def _surprise(errors: np.ndarray, width: np.ndarray, which: np.ndarray) -> np.ndarray:
-    """Return the probabilities that nothing predicts a level, as ground shows them, (k, 1, 1)."""
-    outside = (np.abs(errors) > _UNLIKELY * width) & which
-    share = outside.sum(axis=(1, 2)) / np.maximum(which.sum(axis=(1, 2)), 1)
-    return np.clip(share, *SURPRISES).astype(np.float32)[:, None, None]
 
 
 def normal(values: np.ndarray, spread: np.ndarray) -> np.ndarray:

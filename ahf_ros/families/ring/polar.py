@@ -225,7 +225,7 @@ def on_circles(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return gray values on circles about targets, whose black is lifted, (k, n, m).
 
-    With them comes up to which of the radii, ascending and of shape (n,) or (k, n), the image shows
+    With them comes up to which of the radii, ascending, shape (n,) or (k, n), an image shows
     targets at angles, (k, m).
     """
     directions = np.array([np.cos(angles), np.sin(angles)])

@@ -37,14 +37,13 @@ from ahf_ros.families.ring.polar import (
     PART,
     PolarImages,
     angles_of,
+    on_circles,
     on_dark_ground,
     polar_images,
 )
 from ahf_ros.prints.ring import RingPrint, least_marked
 from ahf_ros.vision import frame
-from ahf_ros.vision.black import lifted
 from ahf_ros.vision.circle_fit import ENOUGH, Fit, fit_circles
-from ahf_ros.vision.sampling import sample_circles
 
 PER_SECTOR = 10
 """Angles of a sector at which bands are read."""
@@ -183,8 +182,7 @@ def _settled(
     of_gap, beyond = (of[clear_of(of, family.circles)] for of in (of_gap, outer + MARGIN))
     radii = np.concatenate([DOT, of_gap, of_band, beyond])
     angles = angles_of(family.bits * PER_SECTOR)
-    levels = np.maximum(sample_circles(gray, targets.frames, angles, radii), 0)
-    levels = lifted(levels, polar.lift.astype(np.float32)[:, None, None])
+    levels, _ = on_circles(gray, targets.frames, angles, radii, polar.lift)
     of_target = targets.frames, polar.lift, angles, radii
     of_print = family.band, family.circles, polar.rim(outer), polar.contrast
     light, spread = predicted_light(gray, *of_target, *of_print)
