@@ -138,8 +138,9 @@ void outline_fits(count k, count m, count n, count q, const double offset[k][m],
             least_squares(m, n, q, basis, products, grown, weights[i], displacement, prior,
                           equations[i], unknowns[i]);
             for (count j = 0; j < m; j++) {
-                errors[i][j] = displacement[j] - dot(n, basis[j], unknowns[i]);
-                if (q > n)
+                bool used = seen[i][j] || own[i][j] > 0;
+                errors[i][j] = used ? displacement[j] - dot(n, basis[j], unknowns[i]) : 0;
+                if (used && q > n)
                     errors[i][j] -= grown[j] * unknowns[i][n];
                 sizes[j] = fabs(errors[i][j]);
             }

@@ -141,6 +141,10 @@ static inline void least_squares(count m, count n, count q, const double basis[m
         mixed[a] = right[a] = 0;
     for (count j = 0; j < m; j++) {
         double weight = weights[j], value = weight * values[j];
+        if (weight == 0) {
+            product += pairs;
+            continue;
+        }
         for (count pair = 0; pair < pairs; pair++)
             sums[pair] += weight * *product++;
         for (count a = 0; a < n; a++)
