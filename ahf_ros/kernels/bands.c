@@ -15,13 +15,15 @@ void bounded_readings(count k, count h, count n, count m, const float values[k][
                       const float most[k], float bounded[k][n][m])
 {
     for (count b = 0; b < k; b++)
-        for (count s = 0; s < n; s++)
-            for (count a = 0; a < m; a++) {
-                float sum = 0;
-                for (count half = 0; half < h; half++)
-                    sum += values[b][half][s][a];
-                bounded[b][s][a] = (float)(most[b] * hyperbolic_tangent(sum / most[b]));
-            }
+        for (count s = 0; s < n; s++) {
+            for (count a = 0; a < m; a++)
+                bounded[b][s][a] = 0;
+            for (count half = 0; half < h; half++)
+                for (count a = 0; a < m; a++)
+                    bounded[b][s][a] += values[b][half][s][a];
+            for (count a = 0; a < m; a++)
+                bounded[b][s][a] = most[b] * hyperbolic_tangent_f(bounded[b][s][a] / most[b]);
+        }
 }
 
 /* Evidence for shares of ink, the best one within `reach` steps of each between paper, the first,
@@ -97,6 +99,64 @@ void likeliest_bits(count k, count n, const double ones[k][n], const double pair
         for (count i = n - 1; i >= 0; i--) {
             bits[b][i] = last;
             last = before[b][best_first][i][last];
+        }
+    }
+}
+
+/* Evidence of a word at four phases, by what each seven of its bits and the one before them say. */
+enum { BITS = 7, PARTS = 9, PHASES = 4 };
+
+static inline void evidence_of(int64_t word, count n, float sums[PARTS][2 << BITS][PHASES],
+                               float scores[PHASES])
+{
+    uint64_t left = (uint64_t)word << 1 | (word >> within(n - 1, 63) & 1);
+    for (int phase = 0; phase < PHASES; phase++)
+        scores[phase] = 0;
+    for (count part = 0; part < PARTS && left; part++, left >>= BITS)
+        for (int phase = 0; phase < PHASES; phase++)
+            scores[phase] += sums[part][left & ((2 << BITS) - 1)][phase];
+}
+
+/* The words with the most evidence at any of four phases, more than others before they are read by
+   a prior, and the best phase of each: c of them, the best first, again where there are fewer. */
+void likeliest_words(count k, count n, count w, count c, const double ones[k][4][n],
+                     const double pairs[k][4][n], const int64_t words[w], const float prior[w],
+                     int64_t best[k][c], int64_t phases[k][c], float highest[c])
+{
+    float sums[PARTS][2 << BITS][PHASES] = {0}, scores[PHASES];
+    for (count b = 0; b < k; b++) {
+        for (count part = 0; part * BITS < n && part < PARTS; part++)
+            for (count bit = 0; bit < BITS; bit++) {
+                count i = within(part * BITS + bit, n), top = 2 << bit;
+                for (count low = 0; low < top; low++)
+                    for (int phase = 0; phase < PHASES; phase++) {
+                        float one = (float)ones[b][phase][i], pair = (float)pairs[b][phase][i];
+                        pair = low >> bit & 1 ? pair : 0;
+                        sums[part][top + low][phase] = sums[part][low][phase] + one + pair;
+                    }
+            }
+        count some = 0;
+        for (count i = 0; i < w; i++) {
+            evidence_of(words[i], n, sums, scores);
+            float score = greater_f(greater_f(scores[0], scores[1]), greater_f(scores[2], scores[3]));
+            score += prior[i];
+            if (some == c && !(score > highest[c - 1]))
+                continue;
+            count place = some < c ? some++ : c - 1;
+            for (; place > 0 && score > highest[place - 1]; place--) {
+                highest[place] = highest[place - 1];
+                best[b][place] = best[b][place - 1];
+            }
+            highest[place] = score;
+            best[b][place] = words[i];
+        }
+        for (count place = 0; place < c; place++) {
+            best[b][place] = best[b][place % some];
+            evidence_of(best[b][place], n, sums, scores);
+            phases[b][place] = 0;
+            for (int phase = 1; phase < PHASES; phase++)
+                if (scores[phase] > scores[phases[b][place]])
+                    phases[b][place] = phase;
         }
     }
 }

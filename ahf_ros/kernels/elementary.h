@@ -131,6 +131,13 @@ static inline float logarithm_f(float x)
     return n * 0.693145751953125f + (2.0f * s + (s * z * sum + n * 1.42860682030941723212e-6f));
 }
 
+/* Hyperbolic tangent to 2e-7. */
+static inline float hyperbolic_tangent_f(float x)
+{
+    float grown = exponential_f(2.0f * greater_f(lesser_f(x, 10.0f), -10.0f));
+    return (grown - 1.0f) / (grown + 1.0f);
+}
+
 /* Density of a normal distribution of a deviation at a distance from its middle. */
 static inline float normal_density_f(float distance, float deviation)
 {

@@ -157,6 +157,26 @@ def test_readings_are_bounded_and_shares_take_the_best_near_them(seed: int) -> N
         assert best[b, s, a] == near.max()
 
 
+@pytest.mark.parametrize('bits', [1, 2, 7, 8, 14, 21])
+def test_the_likeliest_words_are_those_with_most_evidence_at_any_phase(bits: int) -> None:
+    generator, c = np.random.default_rng(bits), 6
+    ones, pairs = generator.normal(size=(2, 3, 4, bits))
+    words = np.unique(generator.integers(0, 1 << bits, 40))
+    before = generator.normal(size=len(words)).astype(np.float32)
+    best, phases, _ = kernels.likeliest_words(ones, pairs, words, before, c=c)
+    shown = words[:, None] >> np.arange(bits) & 1
+    joined = shown & np.roll(shown, 1, axis=1)
+    for b in range(3):
+        scores = shown @ ones[b].T + joined @ pairs[b].T
+        ranked = np.argsort(-(scores.max(axis=1) + before), kind='stable')[:c]
+        wanted = np.resize(ranked, c)
+        assert best[b].tolist() == words[wanted].tolist()
+        assert phases[b].tolist() == scores[wanted].argmax(axis=1).tolist()
+    wild = np.full((1, 4, bits), np.nan)
+    best, *_ = kernels.likeliest_words(wild, wild, [-1, 1 << 62], [np.inf, np.nan], c=c)
+    assert set(best[0].tolist()) <= {-1, 1 << 62}
+
+
 @pytest.mark.parametrize('seed', SEEDS)
 def test_light_is_as_predicted_where_the_best_path_says_so(seed: int) -> None:
     _, drawn = numbers(seed)

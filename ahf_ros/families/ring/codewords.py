@@ -38,33 +38,27 @@ def best_words(
     families of more than 50000 rotations, only those words compete that differ from the sectors'
     own evidence in the ten least certain sectors at most.
     """
-    everything = len(family.words) * family.bits <= _EXHAUSTIVE
-    count = COMPETITORS * (2 if expected else 1)
-    words, phases = np.zeros((2, len(ones), count), np.int64)
+    ranked_by = [expected, frozenset[int]()] if expected else [expected]
+    words, phases = np.zeros((2, len(ones), COMPETITORS * len(ranked_by)), np.int64)
     bits, highest = likeliest_bits(ones, pairs)
     hopeful = np.flatnonzero(highest.max(axis=1, initial=0) > _MINIMUM_EVIDENCE)
     likely = np.argsort(-highest, axis=1, kind='stable')[:, :_PHASES]
     of_ones, of_pairs, bits = (
         np.take_along_axis(of, likely[..., None], axis=1) for of in (ones, pairs, bits)
     )
-    of_phases = np.concatenate([of_ones, of_pairs], axis=2).astype(np.float32)
-    at_once = max(1, 2 * _EXHAUSTIVE // (len(family.words) * family.bits)) if everything else 1
-    for start in range(0, len(hopeful), at_once):
-        some = hopeful[start : start + at_once]
-        one = some[0]
-        competing, shown = (
-            _all_rotations(family)
-            if everything
-            else _near_rotations(_beside(bits[one], of_ones[one], of_pairs[one]), family, expected)
-        )
-        scores = of_phases[some] @ shown
-        of_word = np.round(scores.max(axis=1), 2)  # last bits differ between processors
-        best = _best(of_word, COMPETITORS)
-        if expected:
-            with_prior = of_word + prior(competing, family, expected)
-            best = np.concatenate([_best(with_prior, COMPETITORS), best], axis=1)
-        words[some] = competing[best]
-        phase = np.take_along_axis(scores, best[:, None], axis=2).argmax(axis=1)
+    everything = len(family.words) * family.bits <= _EXHAUSTIVE
+    for some in [hopeful] if everything else hopeful[:, None]:
+        if everything:
+            competing = _all_rotations(family)
+        else:
+            sectors = _beside(*(of[some[0]] for of in (bits, of_ones, of_pairs)))
+            competing = _near_rotations(sectors, family, expected)
+        of_bands = of_ones[some], of_pairs[some], competing
+        found = [
+            kernels.likeliest_words(*of_bands, prior(competing, family, likely_ids), c=COMPETITORS)
+            for likely_ids in ranked_by
+        ]
+        words[some], phase = (np.hstack([best[of] for best in found]) for of in (0, 1))
         phases[some] = np.take_along_axis(likely[some], phase, axis=1)
     return words, phases
 
@@ -85,13 +79,6 @@ def _beside(bits: np.ndarray, ones: np.ndarray, pairs: np.ndarray) -> np.ndarray
     return ones + joined + np.roll(pairs, -1, axis=-1) * np.roll(bits, -1, axis=-1)
 
 
-def _best(scores: np.ndarray, count: int) -> np.ndarray:
-    """Return the indices of the highest scores (k, w), repeated where there are fewer."""
-    best = np.argpartition(scores, -min(count, scores.shape[1]), axis=1)[:, -count:]
-    order = np.argsort(-np.take_along_axis(scores, best, 1), axis=1, kind='stable')
-    return np.resize(np.take_along_axis(best, order, 1).T, (count, len(scores))).T
-
-
 def prior(words: np.ndarray, family: RingPrint, expected: frozenset[int]) -> np.ndarray:
     """Return the evidence for words in any rotation before they are read, float32, of their shape.
 
@@ -104,15 +91,15 @@ def prior(words: np.ndarray, family: RingPrint, expected: frozenset[int]) -> np.
 
 
 @cache
-def _all_rotations(family: RingPrint) -> tuple[np.ndarray, np.ndarray]:
-    """Return all rotations of all words, and what they show."""
-    return _with_bits(_rotated(family.words, family), family.bits)
+def _all_rotations(family: RingPrint) -> np.ndarray:
+    """Return all rotations of all words."""
+    return _rotated(family.words, family)
 
 
 def _near_rotations(
     sectors: np.ndarray, family: RingPrint, expected: frozenset[int]
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return the words near to what the sectors say at any of the phases, and what they show.
+) -> np.ndarray:
+    """Return the words near to what the sectors say at any of the phases, ascending.
 
     Those that are expected compete as well.
     """
@@ -126,7 +113,7 @@ def _near_rotations(
     words.sort(kind='stable')
     new = np.ones(len(words), bool)
     np.not_equal(words[1:], words[:-1], out=new[1:])
-    return _with_bits(words[new], family.bits)
+    return words[new]
 
 
 @cache
@@ -154,9 +141,3 @@ def _rotated(words: np.ndarray, family: RingPrint) -> np.ndarray:
     """Return all rotations of words, ascending."""
     turns = [rotated_words(words, turn, family.bits) for turn in range(family.bits)]
     return np.unique(turns)
-
-
-def _with_bits(words: np.ndarray, bits: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return words and their ones and pairs, float32, shape (2 bits, number of words)."""
-    ones = words >> np.arange(bits)[:, None] & 1
-    return words, np.concatenate([ones, ones & np.roll(ones, 1, axis=0)]).astype(np.float32)
