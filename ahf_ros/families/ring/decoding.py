@@ -141,8 +141,11 @@ def decode(
     decoded = Words.none(count, angles)
     if not read.size:
         return decoded
-    bands = _Bands.of(evidence.select(read), of_bands.select(read), overhang[read], family)
-    words, phases = _at_near_phases(words[read], phases[read])
+    if read.size < count:
+        evidence, of_bands, overhang = evidence.select(read), of_bands.select(read), overhang[read]
+        ones, pairs, words, phases = ones[read], pairs[read], words[read], phases[read]
+    bands = _Bands.of(evidence, of_bands, overhang, family)
+    words, phases = _at_near_phases(words, phases)
     steps = bands.steps(words, phases)
     scores = bands.scores(steps)
     ids = canonical(words, family)[1]
@@ -157,7 +160,7 @@ def decode(
     inked, mixed = 2 * shown > bands.last, (shown > 0) & (shown < bands.last)
     other, of_other = word, score
     if looks:
-        other = _as_it_looks(ones[read], pairs[read], phase, family)
+        other = _as_it_looks(ones, pairs, phase, family)
     if (other != word).any():
         of_other = bands.scores(bands.steps(other[:, None], phase[:, None]))[:, 0]
     coded = beside = np.zeros(len(read))

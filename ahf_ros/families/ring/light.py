@@ -12,11 +12,9 @@ from functools import lru_cache
 
 import numpy as np
 
+from ahf_ros import kernels
 from ahf_ros.prints.ring import Radii
-from ahf_ros.vision import frame
-from ahf_ros.vision.black import lifted
 from ahf_ros.vision.logarithm import LOG_OFFSET
-from ahf_ros.vision.sampling import sample
 
 _CELLS, _TRANSFORM = 64, 96  # sides of the rectified target and of its transforms
 _MARGIN = 0.85  # beyond the band, dot radii
@@ -58,8 +56,9 @@ def predicted_light(
     light, spread = np.empty(shape, np.float32), np.empty(shape, np.float32)
     for start in range(0, len(frames), _PART):
         part = slice(start, start + _PART)
-        values = np.maximum(sample(gray, frame.project(frames[part], points)), 0)
-        values = lifted(values, lift[part].astype(np.float32)[:, None, None])
+        at = frames[part], points.reshape(-1, 2).T, np.ones((len(lift[part]), 1))
+        values, _ = kernels.circle_values(gray, *at, lift[part].astype(np.float32))
+        values = values.reshape(-1, _CELLS, _CELLS)
         grounds, (seen, overlap, few) = ground[None], compared
         if plate is not None and contrast is not None and np.isfinite(plate[part]).any():
             ends = plate[part][..., _nearest(angles, points)]
