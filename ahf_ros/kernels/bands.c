@@ -119,7 +119,7 @@ static inline void evidence_of(int64_t word, count n, float sums[PARTS][2 << BIT
 
 /* The words with the most evidence at any of four phases, more than others before they are read by
    a prior, and the best phase of each: c of them, the best first, again where there are fewer. */
-void likeliest_words(count k, count n, count w, count c, const double ones[k][4][n],
+void competing_words(count k, count n, count w, count c, const double ones[k][4][n],
                      const double pairs[k][4][n], const int64_t words[w], const float prior[w],
                      int64_t best[k][c], int64_t phases[k][c], float highest[c])
 {

@@ -89,7 +89,7 @@ void sector_evidence(count k, count m, count p, count n, const float inked[k][m]
                      double pairs[k][p][n]);
 void likeliest_bits(count k, count n, const double ones[k][n], const double pairs[k][n],
                     bool bits[k][n], double highest[k], bool before[k][2][n][2]);
-void likeliest_words(count k, count n, count w, count c, const double ones[k][4][n],
+void competing_words(count k, count n, count w, count c, const double ones[k][4][n],
                      const double pairs[k][4][n], const int64_t words[w], const float prior[w],
                      int64_t best[k][c], int64_t phases[k][c], float highest[c]);
 void word_steps(count k, count w, count p, count n, count m, const int64_t words[k][w],

@@ -163,7 +163,7 @@ def test_the_likeliest_words_are_those_with_most_evidence_at_any_phase(bits: int
     ones, pairs = generator.normal(size=(2, 3, 4, bits))
     words = np.unique(generator.integers(0, 1 << bits, 40))
     before = generator.normal(size=len(words)).astype(np.float32)
-    best, phases, _ = kernels.likeliest_words(ones, pairs, words, before, c=c)
+    best, phases, _ = kernels.competing_words(ones, pairs, words, before, c=c)
     shown = words[:, None] >> np.arange(bits) & 1
     joined = shown & np.roll(shown, 1, axis=1)
     for b in range(3):
@@ -173,7 +173,7 @@ def test_the_likeliest_words_are_those_with_most_evidence_at_any_phase(bits: int
         assert best[b].tolist() == words[wanted].tolist()
         assert phases[b].tolist() == scores[wanted].argmax(axis=1).tolist()
     wild = np.full((1, 4, bits), np.nan)
-    best, *_ = kernels.likeliest_words(wild, wild, [-1, 1 << 62], [np.inf, np.nan], c=c)
+    best, *_ = kernels.competing_words(wild, wild, [-1, 1 << 62], [np.inf, np.nan], c=c)
     assert set(best[0].tolist()) <= {-1, 1 << 62}
 
 

@@ -55,7 +55,7 @@ def best_words(
             competing = _near_rotations(sectors, family, expected)
         of_bands = of_ones[some], of_pairs[some], competing
         found = [
-            kernels.likeliest_words(*of_bands, prior(competing, family, likely_ids), c=COMPETITORS)
+            kernels.competing_words(*of_bands, prior(competing, family, likely_ids), c=COMPETITORS)
             for likely_ids in ranked_by
         ]
         words[some], phase = (np.hstack([best[of] for best in found]) for of in (0, 1))
