@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar, runtime_checkable
 
@@ -25,6 +25,10 @@ _MINIMUM_RADIUS = 4.0  # of a dot, px, where the user sets none
 _MINIMUM_RADII = {'gsi': 2.0, 'dots': 2.5}  # of kinds whose dot is small beside the target
 
 _SIGNS = {'both': (1, -1), 'dark': (1,), 'bright': (-1,)}  # of the colour of dots
+
+
+Part = tuple[int, int, int, int]
+"""A part of an image: its edges left, top, right and bottom, px."""
 
 
 class Unavailable(ValueError):
@@ -112,23 +116,35 @@ class Drafter(Protocol):
         ...
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Confirmed:
+    """Known targets that an image shows again, and what searches it for others.
+
+    Attributes
+    ----------
+    targets : sequence of Target
+        As a call would report them. What shows no target any more, or a doubtful one, is missing.
+    search : callable
+        From parts of the image to all targets that it shows: these, and those in the parts, sorted
+        by ID.
+    """
+
+    targets: Sequence[Target]
+    search: Callable[[Sequence[Part]], list[Target]]
+
+
 @runtime_checkable
 class Confirming(Protocol):
     """A detector that reads targets again in the next image, without a search for them."""
 
-    def confirm(self, image: np.ndarray, targets: Sequence[Target]) -> list[Target]:
-        """Return what an image shows in the places of targets, as a call would report it.
+    def confirm(self, image: np.ndarray, targets: Sequence[Target]) -> Confirmed:
+        """Return what an image shows in the places of targets.
 
         Parameters
         ----------
         image : ndarray of uint8, uint16, float32 or float64, shape (height, width)
         targets : sequence of Target
             With centres to about two pixels, and the shapes that they have in this image.
-
-        Returns
-        -------
-        list of Target
-            Sorted by ID. What shows no target any more, or a doubtful one, is missing.
         """
         ...
 

@@ -25,14 +25,10 @@ from ahf_ros.base.target import (
     SquareMarker,
     Target,
     reach_of,
-    sorted_targets,
 )
-from ahf_ros.families.explained import without_targets
+from ahf_ros.families.contract import Confirmed, Part
 from ahf_ros.identification.filtering.identifier import Seen
 from ahf_ros.identification.filtering.trials import DetectorFunction
-
-Box = tuple[int, int, int, int]
-"""A part of an image: its edges left, top, right and bottom, px."""
 
 _AROUND = 1.6  # half the side of what is looked for again, in semi-axes of a target's ellipse
 _FARTHEST = 1.5  # by which a target may have moved, in its semi-axes
@@ -67,7 +63,7 @@ class Following:
     """
 
     detector: DetectorFunction
-    confirm: Callable[[np.ndarray, Sequence[Target]], list[Target]]
+    confirm: Callable[[np.ndarray, Sequence[Target]], Confirmed]
     prints: Prints
     interval: int
 
@@ -90,35 +86,33 @@ class Following:
         """Return what an image shows, None if it must be searched wholly."""
         known = [it for it in before.targets if it.id != UNDECODED]
         expected = list(_where(before.image, image, known))
-        confirmed = _alike(self.confirm(image, expected), expected) if known else {}
+        again = self.confirm(image, expected)
+        confirmed = _alike(again.targets, expected)
         if len(confirmed) < _LEAST * len(known):
             return None
-        followed = [replace(target, followed=True) for target in confirmed.values()]
+        followed = list(confirmed.values())
         movement = _movement([known[index] for index in confirmed], followed)
+        height, width = image.shape
         lost = [it for index, it in enumerate(known) if index not in confirmed]
         lost += [*before.lost, *(it for it in before.targets if it.id == UNDECODED)]
-        height, width = image.shape
         lost = [_displaced(it, *(_to(movement, it) - (it.x, it.y))) for it in lost]
         lost = [it for it in lost if _holds((0, 0, width, height), it)]
         reach = max(map(self._reach, (*known, *lost)), default=0.0)
-        part = _part(image.shape, before.turn, self.interval)
-        boxes = [_grown(part, math.ceil(max(reach, _AT_LEAST)), image.shape)]
-        boxes += self._places(lost, image.shape)
+        turn = _part(image.shape, before.turn, self.interval)
+        parts = [_grown(turn, math.ceil(max(reach, _AT_LEAST)), image.shape)]
+        parts += self._places(lost, image.shape)
         changed = _changed(image, _moved(before.image, movement))
-        boxes += self._changes(changed, followed, math.ceil(max(2 * reach, _AT_LEAST)))
-        boxes = _joined(boxes)
-        if sum(map(_area, boxes)) > _MOST * image.size:
-            boxes = [(0, 0, width, height)]
-        new: list[Target] = []
-        for box in boxes:
-            found = self._searched(image, box, followed)
-            new += [it for it in found if not any(_is_same(it, of) for of in new)]
-        prints = [it.print for it in (*followed, *new) if it.id != UNDECODED]
-        if len(set(prints)) < len(prints):
-            return None
+        parts += self._changes(changed, followed, math.ceil(max(2 * reach, _AT_LEAST)))
+        parts = _joined(parts)
+        if sum(map(_area, parts)) > _MOST * image.size:
+            parts = [(0, 0, width, height)]
+        found = again.search(parts)
+        targets = tuple(
+            replace(it, followed=any(_is_same(it, of) for of in followed)) for it in found
+        )
         # What is lost is looked for in each image, until all of its part has been searched.
-        lost = [it for it in lost if it.print not in prints and not _holds(part, it)]
-        targets = tuple(sorted_targets([*followed, *new]))
+        prints = {it.print for it in targets}
+        lost = [it for it in lost if it.print not in prints and not _holds(turn, it)]
         return Seen(image.copy(), targets, tuple(lost), before.turn + 1)
 
     def _reach(self, target: Target) -> float:
@@ -129,7 +123,7 @@ class Following:
             )
         return _MARGIN * reach_of(target, self.prints) * target.semi_major
 
-    def _places(self, lost: Iterable[Target], shape: tuple[int, int]) -> Iterator[Box]:
+    def _places(self, lost: Iterable[Target], shape: tuple[int, int]) -> Iterator[Part]:
         """Yield the parts of an image in which targets are looked for that are lost."""
         for it in lost:
             x, y = round(it.x), round(it.y)
@@ -137,7 +131,7 @@ class Following:
 
     def _changes(
         self, changed: np.ndarray, followed: Iterable[Target], margin: int
-    ) -> Iterator[Box]:
+    ) -> Iterator[Part]:
         """Yield the parts of an image that changed beside its targets, with a margin."""
         for it in followed:
             centre = round((it.x - 0.5) / 2), round((it.y - 0.5) / 2)
@@ -149,32 +143,8 @@ class Following:
         tiles = (counts >= _CHANGED).astype(np.uint8)
         _, _, found, _ = cv2.connectedComponentsWithStats(tiles, connectivity=8)
         for left, top, across, down, _ in (2 * _TILE * found[1:]).tolist():
-            box = left, top, left + across, top + down
-            yield _grown(box, margin, (2 * height, 2 * width))
-
-    def _searched(self, image: np.ndarray, box: Box, followed: Iterable[Target]) -> list[Target]:
-        """Return what a part of an image shows beside targets that are followed."""
-        left, top, right, bottom = box
-        part = np.ascontiguousarray(image[top:bottom, left:right])
-        near = (_displaced(it, -left, -top) for it in followed if self._within(it, box, -1.0))
-        found = self.detector(without_targets(part, near, self.prints))
-        height, width = image.shape
-        # What touches an edge that the image does not have may be a part of something else.
-        inner = (
-            left if left else -math.inf,
-            top if top else -math.inf,
-            right if right < width else math.inf,
-            bottom if bottom < height else math.inf,
-        )
-        new = (_displaced(it, left, top) for it in found)
-        return [it for it in new if self._within(it, inner, 1.0)]
-
-    def _within(self, target: Target, box: tuple[float, ...], sign: float) -> bool:
-        """Return whether a target is wholly in a part of an image; in a part, if sign is -1."""
-        left, top, right, bottom = box
-        reach = sign * self._reach(target)
-        across = left <= target.x - reach and target.x + reach <= right
-        return across and top <= target.y - reach and target.y + reach <= bottom
+            part = left, top, left + across, top + down
+            yield _grown(part, margin, (2 * height, 2 * width))
 
 
 def _where(before: np.ndarray, image: np.ndarray, known: Sequence[Target]) -> Iterator[Target]:
@@ -231,9 +201,8 @@ def _movement(old: Sequence[Target], new: Sequence[Target]) -> np.ndarray:
     if not old:
         return np.eye(2, 3)
     start, end = (np.array([(it.x, it.y) for it in of]) for of in (old, new))
-    shift = np.median(end - start, axis=0)
-    if len(old) < _TELLING or np.hypot(*shift) < _STILL:
-        return np.column_stack([np.eye(2), shift])
+    if len(old) < _TELLING:
+        return np.column_stack([np.eye(2), np.median(end - start, axis=0)])
     places = np.column_stack([start, np.ones(len(old))])
     return np.linalg.lstsq(places, end, rcond=None)[0].T
 
@@ -246,7 +215,8 @@ def _to(movement: np.ndarray, target: Target) -> np.ndarray:
 def _moved(image: np.ndarray, movement: np.ndarray) -> np.ndarray:
     """Return an image after a movement."""
     height, width = image.shape
-    if np.abs(movement - np.eye(2, 3)).max() < _STILL:
+    corners = np.array([(0, 0, 1), (width, 0, 1), (0, height, 1), (width, height, 1)])
+    if np.abs(corners @ movement.T - corners[:, :2]).max() < _STILL:
         return image
     return cv2.warpAffine(image, movement, (width, height), borderMode=cv2.BORDER_REPLICATE)
 
@@ -273,7 +243,7 @@ def _noise(image: np.ndarray) -> float:
     return 1.4826 * float(np.median(mask)) / 6
 
 
-def _part(shape: tuple[int, int], turn: int, interval: int) -> Box:
+def _part(shape: tuple[int, int], turn: int, interval: int) -> Part:
     """Return the part of an image whose turn it is."""
     height, width = shape
     columns = max(1, round(math.sqrt(interval * width / height)))
@@ -284,13 +254,13 @@ def _part(shape: tuple[int, int], turn: int, interval: int) -> Box:
     return left, top, right, bottom
 
 
-def _holds(box: Box, target: Target) -> bool:
-    return box[0] <= target.x < box[2] and box[1] <= target.y < box[3]
+def _holds(part: Part, target: Target) -> bool:
+    return part[0] <= target.x < part[2] and part[1] <= target.y < part[3]
 
 
-def _grown(box: Box, margin: int, shape: tuple[int, int]) -> Box:
+def _grown(part: Part, margin: int, shape: tuple[int, int]) -> Part:
     """Return a part of an image with a margin about it."""
-    left, top, right, bottom = box
+    left, top, right, bottom = part
     height, width = shape
     return (
         max(left - margin, 0),
@@ -300,9 +270,9 @@ def _grown(box: Box, margin: int, shape: tuple[int, int]) -> Box:
     )
 
 
-def _joined(boxes: Iterable[Box]) -> list[Box]:
+def _joined(partes: Iterable[Part]) -> list[Part]:
     """Return parts of an image, two as one where this is not more to search."""
-    joined = list(boxes)
+    joined = list(partes)
     while True:
         for first, second in combinations(range(len(joined)), 2):
             one, other = joined[first], joined[second]
@@ -316,8 +286,8 @@ def _joined(boxes: Iterable[Box]) -> list[Box]:
             return joined
 
 
-def _area(box: Box) -> int:
-    return (box[2] - box[0]) * (box[3] - box[1])
+def _area(part: Part) -> int:
+    return (part[2] - part[0]) * (part[3] - part[1])
 
 
 def _displaced(target: Target, x: float, y: float) -> Target:

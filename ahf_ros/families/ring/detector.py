@@ -9,13 +9,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import ClassVar
 
 import numpy as np
 
 from ahf_ros.base.blas import one_blas_thread
 from ahf_ros.base.target import Target, sorted_targets
-from ahf_ros.families.contract import DetectorSettings
+from ahf_ros.families.contract import Confirmed, DetectorSettings, Part
 from ahf_ros.families.pyramid_detector import PyramidDetector
 from ahf_ros.families.ring.bands import with_measured_bands
 from ahf_ros.families.ring.choice import choose_families, further_families
@@ -24,6 +25,7 @@ from ahf_ros.families.ring.families import contested, decoded, read_families, se
 from ahf_ros.families.ring.full_size import at_full_size
 from ahf_ros.families.ring.hypotheses import Hypotheses
 from ahf_ros.families.ring.known import WHOLE, Explained, Prior
+from ahf_ros.families.ring.parts import ImagePart, dots_in, image_parts
 from ahf_ros.families.ring.proposals import (
     PROPOSALS,
     Proposal,
@@ -73,7 +75,7 @@ class RingDetector(PyramidDetector):
         return found, unexplained(hypotheses).frames
 
     @one_blas_thread()
-    def confirm(self, image: np.ndarray, targets: Sequence[Target]) -> list[Target]:
+    def confirm(self, image: np.ndarray, targets: Sequence[Target]) -> Confirmed:
         """Return what an image shows in the places of targets; see `Confirming`."""
         check_image(image)
         pyramid = bare_pyramid(as_gray(image), self.settings.max_radius)
@@ -81,8 +83,18 @@ class RingDetector(PyramidDetector):
         known = proposing(Dots(frames_of(targets), signs, np.ones(len(signs))))
         names = {it.family for it in targets}
         shown = [code for code in self.design if code.name in names]
-        read = read_pyramid(pyramid, self.settings, self.expected, (known,), shown)
-        return report(read, self.settings, self.contested)
+        of_image = pyramid, self.settings, self.expected
+        read = read_pyramid(*of_image, (known,), shown)
+
+        @one_blas_thread()
+        def search(parts: Sequence[Part]) -> list[Target]:
+            views = image_parts(pyramid.image, parts, self.settings.max_radius)
+            found = read_pyramid(*of_image, PROPOSALS, shown, views, read)
+            for it in views:
+                found = _with_faint_parts(it, found, self.settings, self.expected)
+            return report(found, self.settings, self.contested)
+
+        return Confirmed(report(read, self.settings, self.contested), search)
 
     @one_blas_thread()
     def refine(self, image: np.ndarray, targets: Sequence[Target]) -> list[Target]:
@@ -107,10 +119,18 @@ def hypotheses_in(
 ) -> Hypotheses:
     """Find the dots and words in an image pyramid; see `find_hypotheses`."""
     found = read_pyramid(pyramid, settings, expected, PROPOSALS)
-    for part in faint_parts(pyramid.image):
+    return _with_faint_parts(ImagePart(0, 0, pyramid), found, settings, expected)
+
+
+def _with_faint_parts(
+    view: ImagePart, found: Hypotheses, settings: DetectorSettings, expected: frozenset[int]
+) -> Hypotheses:
+    """Return what was found in an image, and what parts of faint contrast show beside it."""
+    for part in faint_parts(view.pyramid.image):
         seen = read_image(part.gray, settings, expected, (propose_whole,))
         seen = seen.select(seen.certain)
-        seen = replace(seen, frames=frame.translated(seen.frames, part.x, part.y))
+        x, y = view.x + part.x, view.y + part.y
+        seen = replace(seen, frames=frame.translated(seen.frames, x, y))
         new = ~seen.on_dots(found.select(found.certain))
         found = Hypotheses.joined([found, seen.select(new)])
     return found
@@ -169,8 +189,12 @@ def read_pyramid(
     expected: frozenset[int],
     proposals: Sequence[Proposal],
     shown: Sequence[RingPrint] = (),
+    parts: Sequence[ImagePart] | None = None,
+    before: Hypotheses | None = None,
 ) -> Hypotheses:
-    """Find the dots and words in an image pyramid; see `read_image`.
+    """Find the dots and words in an image pyramid, or in parts of it; see `read_image`.
+
+    What was read of the image before is part of the result.
 
     Without families that are known to be shown, a glance at the clearest dots tells them, or a
     closer look in the end. Dots that were left unread until then are read with these.
@@ -179,15 +203,21 @@ def read_pyramid(
     families, polarities = described, settings.polarities
     shown = list(families if len(families) == 1 else shown)
     images = pyramid.images
-    nothing = Hypotheses.unread(NO_FITS, families[0])
-    seen = _Seen((nothing,), Explained.by(nothing))
+    begin = before if before is not None else Hypotheses.unread(NO_FITS, families[0])
+    seen = _Seen((begin,), Explained.by(begin))
     measured: list[tuple[Octave, Fit]] = []
     every = settings.report_undecoded
+    again = partial(
+        read_pyramid, pyramid, settings, expected, proposals, parts=parts, before=before
+    )
     for octave in octaves(pyramid, *settings.radii):
         fits = [NO_FITS]
         for propose in proposals:
             part = None  # proposals take memory of their own
-            proposed = propose(octave, polarities, seen.explained)
+            search = partial(_proposed, propose, polarities)
+            proposed = dots_in(parts, octave, seen.explained, search)
+            if not len(proposed.frames):
+                continue
             part = octave.pyramid.gray
             proposed = with_rims(proposed, families, octave.radii[0])
             dots = measure_dots(part, proposed, covariances=every)
@@ -197,7 +227,7 @@ def read_pyramid(
             if not shown:
                 shown = choose_families(part, dots, families)
                 if shown and any(len(read.words) for read in seen.found):
-                    return read_pyramid(pyramid, settings, expected, proposals, shown)
+                    return again(shown)
             codes = shown or families[:1]
             likely, others = NO_FITS, dots
             if shown or every:
@@ -207,18 +237,18 @@ def read_pyramid(
             seen = _read(part, octave, images, likely, codes, seen, expected, every=every)
             fits.append(dots)
         measured.append((octave, Fit.joined(fits)))
-    for octave, _ in measured if shown and pyramid.edges else ():
-        seen = _with_alike(octave, images, shown, seen, expected)
+    for octave, _ in measured if shown and (pyramid.edges or parts) else ():
+        alike = dots_in(parts, octave, seen.targets, lambda it, known: known.alike(it))
+        seen = _with_alike(octave, images, shown, alike, seen, expected)
     for octave, dots in measured:
-        part = octave.pyramid.gray
-        while True:
+        while left := [code for code in families if code not in shown]:
+            part = octave.pyramid.gray
             rest = seen.left(dots, octave.level)
-            left = [code for code in families if code not in shown]
             codes = further_families(part, rest, left)
             if not codes:
                 break
             if not shown:
-                return read_pyramid(pyramid, settings, expected, proposals, codes)
+                return again(codes)
             clear = seen.explained.select(seen.explained.clear)
             dots = dots.select(~clear.on_them(dots.frames, octave.level))
             likely, _ = measure_likely(part, dots, codes)
@@ -232,10 +262,17 @@ def read_pyramid(
     return replace(read, families=np.array(as_described, object))
 
 
+def _proposed(
+    propose: Proposal, polarities: Sequence[int], octave: Octave, explained: Explained
+) -> Dots:
+    return propose(octave, polarities, explained)
+
+
 def _with_alike(
     octave: Octave,
     images: Sequence[np.ndarray],
     codes: Sequence[RingPrint],
+    alike: Dots,
     seen: _Seen,
     expected: frozenset[int],
 ) -> _Seen:
@@ -243,7 +280,6 @@ def _with_alike(
 
     All else was read in the shape of the dots.
     """
-    alike = seen.targets.alike(octave)
     if not len(alike.frames):
         return seen
     gray = octave.pyramid.gray

@@ -76,6 +76,11 @@ class Explained(ArrayRecord):
             read.edge_shift,
         )
 
+    def moved(self, x: float, y: float) -> Explained:
+        """Return the same in the pixels of an image that shows (0, 0) at (x, y)."""
+        frames = frame.translated(self.frames, x, y)
+        return replace(self, frames=frames, outlines=self.outlines + np.array([x, y]))
+
     def on_them(self, frames: np.ndarray, level: int) -> np.ndarray:
         """Return whether dots lie on these, (n,), in the image halved `level` times."""
         centres = frame.enlarged(frames, level)[:, None, :2, 2]
