@@ -32,6 +32,7 @@ from ahf_ros.identification.filtering.trials import DetectorFunction
 
 _AROUND = 1.6  # half the side of what is looked for again, in semi-axes of a target's ellipse
 _FARTHEST = 1.5  # by which a target may have moved, in its semi-axes
+_BESIDE = 2  # pixels of the smaller image by which targets move differently
 _SEMI_AXIS = 5.0  # px; larger targets are looked for again in a smaller image
 _LEAST = 0.5  # share of the known targets that are confirmed
 _STILL = 0.3  # px; images that moved by less are compared as they are
@@ -43,6 +44,8 @@ _NOISE = 4.0  # deviations of noise beyond the gray values next to a pixel
 _STEP = 3  # gray values, beside noise
 _MARGIN = 1.15  # times the reach of a target, within which its edges are
 _AT_LEAST = 32  # px about what has changed
+_SIDE = 480  # px, usual side of a part that is searched though it seems not to have changed
+_EACH = 100_000  # px, to which the search of a part amounts whatever its size is
 _MOST = 0.3  # share of an image that is searched in parts
 
 
@@ -85,7 +88,7 @@ class Following:
     def _followed(self, image: np.ndarray, before: Seen) -> Seen | None:
         """Return what an image shows, None if it must be searched wholly."""
         known = [it for it in before.targets if it.id != UNDECODED]
-        expected = list(_where(before.image, image, known))
+        expected = _where(before.image, image, known)
         again = self.confirm(image, expected)
         confirmed = _alike(again.targets, expected)
         if len(confirmed) < _LEAST * len(known):
@@ -99,9 +102,10 @@ class Following:
         lost = [it for it in lost if _holds((0, 0, width, height), it)]
         reach = max(map(self._reach, (*known, *lost)), default=0.0)
         turn = _part(image.shape, before.turn, self.interval)
-        parts = [_grown(turn, math.ceil(max(reach, _AT_LEAST)), image.shape)]
-        parts += self._places(lost, image.shape)
-        changed = _changed(image, _moved(before.image, movement))
+        parts = [*self._places(lost, image.shape)]
+        if turn:
+            parts.append(_grown(turn, math.ceil(max(reach, _AT_LEAST)), image.shape))
+        changed = _changed(image, before.image, movement, reach)
         parts += self._changes(changed, followed, math.ceil(max(2 * reach, _AT_LEAST)))
         parts = _joined(parts)
         if sum(map(_area, parts)) > _MOST * image.size:
@@ -112,7 +116,7 @@ class Following:
         )
         # What is lost is looked for in each image, until all of its part has been searched.
         prints = {it.print for it in targets}
-        lost = [it for it in lost if it.print not in prints and not _holds(turn, it)]
+        lost = [it for it in lost if it.print not in prints and not (turn and _holds(turn, it))]
         return Seen(image.copy(), targets, tuple(lost), before.turn + 1)
 
     def _reach(self, target: Target) -> float:
@@ -147,22 +151,49 @@ class Following:
             yield _grown(part, margin, (2 * height, 2 * width))
 
 
-def _where(before: np.ndarray, image: np.ndarray, known: Sequence[Target]) -> Iterator[Target]:
-    """Yield targets of the image before where this one looks most like them, to a pixel or two."""
-    for it in known:
-        level = max(0, math.floor(math.log2(max(it.semi_minor, 1.0) / _SEMI_AXIS) + 0.5))
-        size = 2**level
+def _where(before: np.ndarray, image: np.ndarray, known: Sequence[Target]) -> list[Target]:
+    """Return targets of the image before where this one looks like them, to a pixel or two.
+
+    A pattern of light that moves draws single targets with it, but not all of them together.
+    """
+    if not known:
+        return []
+    minor, major = np.median([(it.semi_minor, it.semi_major) for it in known], axis=0)
+    size = 2 ** max(0, math.floor(math.log2(max(minor, 1.0) / _SEMI_AXIS) + 0.5))
+    reach = max(_BESIDE + 1, math.ceil(_FARTHEST * major / size))
+    side = 2 * reach + 1
+    likeness = np.full((len(known), side, side), np.nan, np.float32)
+    for of, it in zip(likeness, known, strict=True):
         half = math.ceil(_AROUND * it.semi_major / size)
-        reach = max(2, math.ceil(_FARTHEST * it.semi_major / size))
         x, y = (math.floor((of + 0.5) / size) for of in (it.x, it.y))
-        shown = _cut(before, x, y, half, size)
-        around = _cut(image, x, y, half + reach, size)
-        if shown is None or around is None:
-            yield it
-            continue
-        likeness = cv2.matchTemplate(around, shown, cv2.TM_CCOEFF_NORMED)
-        row, column = divmod(int(likeness.argmax()), likeness.shape[1])
-        yield _displaced(it, (column - reach) * size, (row - reach) * size)
+        shown, around = _cut(before, x, y, half, size), _cut(image, x, y, half + reach, size)
+        if shown is not None and around is not None:
+            shown = _dot(it, x, y, half, size) if it.polarity else shown
+            of[:] = cv2.matchTemplate(around, shown, cv2.TM_CCOEFF_NORMED)
+    told = likeness[np.isfinite(likeness).all(axis=(1, 2))]
+    if not len(told):
+        return list(known)
+    common = np.mean([cv2.dilate(it, np.ones((3, 3), np.uint8)) for it in told], axis=0)
+    row, column = divmod(int(common.argmax()), side)
+    row, column = (min(max(it, _BESIDE), side - 1 - _BESIDE) for it in (row, column))
+    near = slice(row - _BESIDE, row + _BESIDE + 1), slice(column - _BESIDE, column + _BESIDE + 1)
+    places = []
+    for it, of in zip(known, likeness, strict=True):
+        own = of + common if np.isfinite(of).all() else common
+        down, across = divmod(int(own[near].argmax()), 2 * _BESIDE + 1)
+        x, y = column - _BESIDE + across - reach, row - _BESIDE + down - reach
+        places.append(_displaced(it, size * x, size * y))
+    return places
+
+
+def _dot(target: Target, x: int, y: int, half: int, size: int) -> np.ndarray:
+    """Return the dot of a target in even light, in the square about a pixel; see `_cut`."""
+    side, lit = 2 * half + 1, 127 + 64 * target.polarity
+    shown = np.full((side, side), lit, np.uint8)
+    centre = half + (target.x + 0.5) / size - 0.5 - x, half + (target.y + 0.5) / size - 0.5 - y
+    axes = 2 * target.semi_major / size, 2 * target.semi_minor / size
+    cv2.ellipse(shown, (centre, axes, math.degrees(target.angle)), 255 - lit, cv2.FILLED)
+    return shown
 
 
 def _cut(image: np.ndarray, x: int, y: int, half: int, size: int) -> np.ndarray | None:
@@ -214,25 +245,49 @@ def _to(movement: np.ndarray, target: Target) -> np.ndarray:
 
 def _moved(image: np.ndarray, movement: np.ndarray) -> np.ndarray:
     """Return an image after a movement."""
-    height, width = image.shape
-    corners = np.array([(0, 0, 1), (width, 0, 1), (0, height, 1), (width, height, 1)])
-    if np.abs(corners @ movement.T - corners[:, :2]).max() < _STILL:
+    if np.abs(_of_corners(image.shape, movement)).max() < _STILL:
         return image
+    height, width = image.shape
     return cv2.warpAffine(image, movement, (width, height), borderMode=cv2.BORDER_REPLICATE)
 
 
-def _changed(image: np.ndarray, before: np.ndarray) -> np.ndarray:
-    """Return where the half of an image is not what it was, or lies next to it; uint8, 1 or 0."""
+def _of_corners(shape: tuple[int, ...], movement: np.ndarray) -> np.ndarray:
+    """Return by how much the corners of an image move, px, (4, 2)."""
+    height, width = shape
+    corners = np.array([(0, 0, 1), (width, 0, 1), (0, height, 1), (width, height, 1)])
+    return corners @ movement.T - corners[:, :2]
+
+
+def _changed(
+    image: np.ndarray, before: np.ndarray, movement: np.ndarray, reach: float
+) -> np.ndarray:
+    """Return where the half of an image is not what it was, or lies next to it; uint8, 1 or 0.
+
+    What is there as far from a side that moves into the image as targets reach is new, too.
+    """
     height, width = image.shape
     now, then = (
         cv2.resize(it, (width // 2, height // 2), interpolation=cv2.INTER_AREA)
-        for it in (image, before)
+        for it in (image, _moved(before, movement))
     )
     beside = np.ones((3, 3), np.uint8)
     above = cv2.subtract(now, cv2.dilate(then, beside))
     below = cv2.subtract(cv2.erode(then, beside), now)
+    difference = cv2.max(above, below)
+    right, down = _of_corners(image.shape, movement).max(axis=0) > _STILL
+    left, up = _of_corners(image.shape, movement).min(axis=0) < -_STILL
+    deep = math.ceil(reach)  # px of the half, twice as far
+    enters = (
+        (right, np.s_[:, :deep]),
+        (left, np.s_[:, -deep:]),
+        (down, np.s_[:deep]),
+        (up, np.s_[-deep:]),
+    )
+    for strip in (of for it_enters, of in enters if it_enters):
+        shown = now[strip]
+        difference[strip] = cv2.subtract(cv2.dilate(shown, beside), cv2.erode(shown, beside))
     limit = _NOISE * _noise(now) + _STEP
-    return cv2.threshold(cv2.max(above, below), limit, 1, cv2.THRESH_BINARY)[1]
+    return cv2.threshold(difference, limit, 1, cv2.THRESH_BINARY)[1]
 
 
 def _noise(image: np.ndarray) -> float:
@@ -243,12 +298,18 @@ def _noise(image: np.ndarray) -> float:
     return 1.4826 * float(np.median(mask)) / 6
 
 
-def _part(shape: tuple[int, int], turn: int, interval: int) -> Part:
-    """Return the part of an image whose turn it is."""
+def _part(shape: tuple[int, int], turn: int, interval: int) -> Part | None:
+    """Return the part of an image whose turn it is, None if it is none's.
+
+    The turns of as many parts as are worth it are spread over the images of an interval.
+    """
     height, width = shape
-    columns = max(1, round(math.sqrt(interval * width / height)))
-    rows = max(1, interval // columns)
-    row, column = divmod(turn % (rows * columns), columns)
+    columns = max(1, min(round(math.sqrt(interval * width / height)), round(width / _SIDE)))
+    rows = max(1, min(interval // columns, round(height / _SIDE)))
+    number, left = divmod(turn % interval * rows * columns, interval)
+    if left >= rows * columns:
+        return None
+    row, column = divmod(number, columns)
     left, right = (width * it // columns for it in (column, column + 1))
     top, bottom = (height * it // rows for it in (row, row + 1))
     return left, top, right, bottom
@@ -271,14 +332,14 @@ def _grown(part: Part, margin: int, shape: tuple[int, int]) -> Part:
 
 
 def _joined(partes: Iterable[Part]) -> list[Part]:
-    """Return parts of an image, two as one where this is not more to search."""
+    """Return parts of an image, two as one where this is no more work."""
     joined = list(partes)
     while True:
         for first, second in combinations(range(len(joined)), 2):
             one, other = joined[first], joined[second]
             left, top = min(one[0], other[0]), min(one[1], other[1])
             both = left, top, max(one[2], other[2]), max(one[3], other[3])
-            if _area(both) <= _area(one) + _area(other):
+            if _area(both) <= _area(one) + _area(other) + _EACH:
                 joined[first] = both
                 del joined[second]
                 break

@@ -51,7 +51,8 @@ def dots_in(
         return search(octave, explained)
     found, size = [NO_DOTS], 2**octave.level
     for part in parts:
-        if octave.level < len(part.pyramid.edges):
+        # With its band, a target is at least twice as wide as its dot.
+        if 4 * octave.radii[0] * size <= max(part.pyramid.image.shape) or not octave.level:
             of_part = replace(octave, pyramid=part.pyramid.half(octave.level))
             dots = search(of_part, explained.moved(-part.x, -part.y))
             frames = frame.translated(dots.frames, part.x / size, part.y / size)
