@@ -1,7 +1,5 @@
 """Identification of square markers on rendered scenes."""
 
-from dataclasses import replace
-
 import cv2
 import numpy as np
 import pytest
@@ -15,7 +13,6 @@ from ahf_ros.prints.square import marker, words
 from ahf_ros.scenes.evaluation import score
 from ahf_ros.scenes.scene import Rendering
 from ahf_ros.vision.image import GAMMA
-from support.calls import calls_of
 from support.pictures.textures import textured_image
 from support.scenes import around, counted, rendering
 from support.square_markers import needs_square_markers
@@ -364,58 +361,3 @@ def test_any_kind_of_image(detect: Detector) -> None:
     same = detect(shown.image)
     for image in (shown.image.astype(np.uint16) * 16, shown.image[:, ::-1][:, ::-1]):
         assert [target.id for target in detect(image)] == [it.id for it in same]
-
-
-def shifted(image: np.ndarray, x: float, y: float) -> np.ndarray:
-    movement = np.array([[1.0, 0, x], [0, 1.0, y]])
-    return cv2.warpAffine(image, movement, image.shape[::-1], borderMode=cv2.BORDER_REPLICATE)
-
-
-@pytest.mark.parametrize(
-    ('light', 'size'), [('normal', 5.0), ('normal', 16.0), ('stripe', 16.0), ('lattice', 40.0)]
-)
-def test_markers_are_confirmed_where_they_moved_to(light: str, size: float) -> None:
-    shown = scene('apriltag_36h11', light=light, dot_radius=size, targets=2, tilt=20.0)
-    detect = create_detector(family='aruco_4x4_50,apriltag_36h11')
-    known = detect(shown.image)
-    assert len(known) == 2
-    for x, y in ((0.0, 0.0), (1.1, -1.0), (-1.5, 0.0), (0.4, 1.4)):
-        image = shifted(shown.image, x, y)
-        confirmed, searched = detect.confirm(image, known), detect(image)
-        assert [it.print for it in confirmed] == [it.print for it in searched]
-        for one, other in zip(confirmed, searched, strict=True):
-            assert np.hypot(one.x - other.x, one.y - other.y) < 0.05
-            assert one.confidence == pytest.approx(other.confidence, abs=0.01)
-    assert detect.confirm(shown.image, []) == []
-    assert calls_of(lambda: detect.confirm(image, known)) < calls_of(lambda: detect(image))
-
-
-def test_what_is_not_there_any_more_is_not_confirmed(detect: Detector) -> None:
-    shown = scene(targets=4)
-    known = detect(shown.image)
-    image, (covered, replaced, *others) = shown.image.copy(), known
-    other = marker(FAMILY, (replaced.id + 7) % 50, 40)
-    for number, it in enumerate((covered, replaced)):
-        corners = np.array(it.corners, np.float32)
-        if number:
-            side = len(other)
-            square = np.array([[0, 0], [side, 0], [side, side], [0, side]], np.float32) - 0.5
-            frame = cv2.getPerspectiveTransform(square, corners)
-            light = float(np.median(image)) * (0.2 + 0.8 * (other > 0))
-            cv2.warpPerspective(
-                light.astype(np.uint8),
-                frame,
-                image.shape[::-1],
-                image,
-                cv2.INTER_AREA,
-                cv2.BORDER_TRANSPARENT,
-            )
-        else:
-            cv2.fillConvexPoly(image, np.rint(corners).astype(np.int32), 120)
-    confirmed = {it.id for it in detect.confirm(image, known)}
-    assert {it.id for it in others} <= confirmed
-    assert confirmed <= {it.id for it in others} | {(replaced.id + 7) % 50}
-    gone = np.tile(np.arange(1000, dtype=np.uint8), (750, 1))
-    assert detect.confirm(gone, known) == []
-    flat = replace(covered, corners=((5.0, 5.0),) * 4)
-    assert detect.confirm(image, [flat, Target(2, 2, 9.0, 9.0, 5.0, 5.0)]) == []

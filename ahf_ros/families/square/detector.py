@@ -6,9 +6,9 @@ their cells. Corners and centres are measured in the image as received, by edges
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from math import ceil, hypot, inf, isnan, log, log2
+from math import ceil, inf, isnan, log, log2
 from typing import Any
 
 import numpy as np
@@ -18,7 +18,7 @@ from ahf_ros.base.blas import one_blas_thread
 from ahf_ros.base.target import SquareMarker, Target, sorted_targets
 from ahf_ros.families.contract import ExpectingDetector, moved_targets
 from ahf_ros.families.square.edges import fit_markers
-from ahf_ros.families.square.frames import Places, centres, side_lengths, square_frames
+from ahf_ros.families.square.frames import Places, centres, side_lengths
 from ahf_ros.families.square.margins import decision_margins
 from ahf_ros.families.square.prints import lay_outlines, lay_prints
 from ahf_ros.families.square.quadrilaterals import find_quadrilaterals
@@ -78,32 +78,6 @@ class SquareDetector(ExpectingDetector):
     @one_blas_thread()
     def draft(self, image: np.ndarray) -> list[Target]:
         """Identify the markers of one image, with the corners of contours, to about a pixel."""
-        return self._read(image, lambda half, _: find_quadrilaterals(half))
-
-    @one_blas_thread()
-    def confirm(self, image: np.ndarray, targets: Sequence[Target]) -> list[Target]:
-        """Return what an image shows in the places of targets; see `Confirming`.
-
-        Prints are laid where they lie now, and read as if they were not known.
-        """
-        known = [it for it in targets if isinstance(it, SquareMarker)]
-        placed = [it for it in self.refine(image, known) if isinstance(it, SquareMarker)]
-        corners = np.array([it.corners for it in placed]).reshape(-1, 4, 2)
-        corners = corners[np.isfinite(square_frames(corners)).all(axis=(1, 2))]
-        found: list[Target] = []
-        for read_now in self._read(image, lambda _, level: reduced(corners, level)):
-            alike = [it for it in placed if it.print == read_now.print and _touch(it, read_now)]
-            measured = [replace(it, confidence=read_now.confidence) for it in alike]
-            found += measured or self.refine(image, [read_now])
-        return sorted_targets(found)
-
-    def _read(
-        self, image: np.ndarray, propose: Callable[[np.ndarray, int], np.ndarray]
-    ) -> list[Target]:
-        """Return the markers that quadrilaterals of an image and of its halves are read as.
-
-        Their corners, px, shape (k, 4, 2), are proposed for each half by its level.
-        """
         check_image(image)
         gray = np.ascontiguousarray(as_gray(image).astype(np.uint8, copy=False))
         groups = self.design
@@ -111,7 +85,7 @@ class SquareDetector(ExpectingDetector):
         expected, everything = self.expected, self.settings.report_undecoded
         found = [NOTHING]
         for level, half in enumerate(halved(gray, levels)):
-            corners = propose(half, level)
+            corners = find_quadrilaterals(half)
             if level:  # where light, a lens or enlargement spreads edges
                 corners = corners[~_are_read(_enlarged(corners, level), Readings.joined(found))]
             small = np.linalg.norm(corners[:, 2] - corners[:, 0], axis=1) < _SMALL
@@ -165,10 +139,6 @@ class SquareDetector(ExpectingDetector):
                 place |= {'hamming': wrong, 'decision_margin': margin}
             refined = moved_targets(refined, alike, places, fit.share > 0)
         return refined
-
-
-def _touch(one: Target, other: Target) -> bool:
-    return hypot(one.x - other.x, one.y - other.y) < max(one.semi_major, other.semi_major)
 
 
 def _markers(readings: Readings, decoded: np.ndarray, groups: Groups) -> list[SquareMarker]:
@@ -287,7 +257,7 @@ def _from_halves(gray: np.ndarray, corners: np.ndarray, ink: np.ndarray) -> np.n
     The contour of a large marker gives its corners to a part of its side, not to two pixels.
     """
     sides = side_lengths(corners).max(axis=1)
-    levels = ceil(log2(max(sides.max() / _LARGE, 1.0)))
+    levels = max(0, ceil(log2(sides.max() / _LARGE)))
     corners = corners.astype(np.float64)
     halves = halved(gray, levels)
     for level in range(levels, 0, -1):

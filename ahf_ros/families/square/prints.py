@@ -98,7 +98,7 @@ def _laid(
     places = np.linspace(-reach, reach, int(np.ceil((cells + 2 * _MARGIN) * count)) + 1)
     of_cells = np.clip(np.floor((places + 0.5) * cells), -1, cells).astype(np.int32) + 1
     inner = -1.0 if prints.shape[1] > 1 else 0.5 - 0.5 / cells
-    size = np.maximum(side_lengths(corners).mean(axis=1), 1.0)
+    size = side_lengths(corners).mean(axis=1)
     blurs = np.stack([USUAL_BLUR / size, _SHARPEST / size, 0 * size + _SOFTEST / cells], axis=1)
     of_steps = _LARGEST_STEP / cells, _SETTLED, _OUTLIER, NORMAL, _USUAL_RESIDUAL
     of_rounds = _AGREES, _HOPELESS, _RIDGE, _ROUNDS
@@ -117,7 +117,6 @@ def _laid(
     laid = project(frames, SQUARE)
     near = np.linalg.norm(laid - corners, axis=2).max(axis=1) < np.maximum(size / cells, _NEAR)
     blur, paper, step, growth = unknowns[:, [_BLUR, _PAPER, _STEP, _GROWTH]].T
-    step = np.where(share > 0, step, -1.0)
     contrast = (paper + step) / np.maximum(paper, 1)
     shift = growth_in_light(growth / step * size, blur * size, contrast)
     covariance = centre_covariance(frames, covariance)
