@@ -135,7 +135,10 @@ class Confirmed:
 
 @runtime_checkable
 class Confirming(Protocol):
-    """A detector that reads targets again in the next image, without a search for them."""
+    """A detector that reads targets again in the next image, without a search for them.
+
+    Its targets have a dot, whose colour their polarity says.
+    """
 
     def confirm(self, image: np.ndarray, targets: Sequence[Target]) -> Confirmed:
         """Return what an image shows in the places of targets.

@@ -20,9 +20,7 @@ import numpy as np
 
 from ahf_ros.base.target import (
     UNDECODED,
-    DottedTarget,
     Prints,
-    SquareMarker,
     Target,
     reach_of,
 )
@@ -88,7 +86,7 @@ class Following:
     def _followed(self, image: np.ndarray, before: Seen) -> Seen | None:
         """Return what an image shows, None if it must be searched wholly."""
         known = [it for it in before.targets if it.id != UNDECODED]
-        expected = _where(before.image, image, known)
+        expected = _where(image, known)
         again = self.confirm(image, expected)
         confirmed = _alike(again.targets, expected)
         if len(confirmed) < _LEAST * len(known):
@@ -121,10 +119,6 @@ class Following:
 
     def _reach(self, target: Target) -> float:
         """Return the radius of a target with the blur of its edges, px."""
-        if isinstance(target, DottedTarget) and target.dots:
-            return _MARGIN * max(
-                math.hypot(x - target.x, y - target.y) + size for x, y, size, *_ in target.dots
-            )
         return _MARGIN * reach_of(target, self.prints) * target.semi_major
 
     def _places(self, lost: Iterable[Target], shape: tuple[int, int]) -> Iterator[Part]:
@@ -151,10 +145,10 @@ class Following:
             yield _grown(part, margin, (2 * height, 2 * width))
 
 
-def _where(before: np.ndarray, image: np.ndarray, known: Sequence[Target]) -> list[Target]:
-    """Return targets of the image before where this one looks like them, to a pixel or two.
+def _where(image: np.ndarray, known: Sequence[Target]) -> list[Target]:
+    """Return targets of the image before where this one shows their dots, to a pixel or two.
 
-    A pattern of light that moves draws single targets with it, but not all of them together.
+    A pattern of light hides the dots of some, but does not move all of them alike.
     """
     if not known:
         return []
@@ -166,10 +160,9 @@ def _where(before: np.ndarray, image: np.ndarray, known: Sequence[Target]) -> li
     for of, it in zip(likeness, known, strict=True):
         half = math.ceil(_AROUND * it.semi_major / size)
         x, y = (math.floor((of + 0.5) / size) for of in (it.x, it.y))
-        shown, around = _cut(before, x, y, half, size), _cut(image, x, y, half + reach, size)
-        if shown is not None and around is not None:
-            shown = _dot(it, x, y, half, size) if it.polarity else shown
-            of[:] = cv2.matchTemplate(around, shown, cv2.TM_CCOEFF_NORMED)
+        around = _cut(image, x, y, half + reach, size)
+        if around is not None:
+            of[:] = cv2.matchTemplate(around, _dot(it, x, y, half, size), cv2.TM_CCOEFF_NORMED)
     told = likeness[np.isfinite(likeness).all(axis=(1, 2))]
     if not len(told):
         return list(known)
@@ -353,9 +346,4 @@ def _area(part: Part) -> int:
 
 def _displaced(target: Target, x: float, y: float) -> Target:
     """Return a target that lies elsewhere in an image."""
-    moved = replace(target, x=target.x + x, y=target.y + y)
-    if isinstance(moved, SquareMarker):
-        return replace(moved, corners=tuple((of[0] + x, of[1] + y) for of in moved.corners))
-    if isinstance(moved, DottedTarget):
-        return replace(moved, dots=tuple((of[0] + x, of[1] + y, *of[2:]) for of in moved.dots))
-    return moved
+    return replace(target, x=target.x + x, y=target.y + y)
