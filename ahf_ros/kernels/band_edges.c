@@ -16,25 +16,26 @@ static inline count circle_below(count c, double innermost, double outermost, do
     return (count)place;
 }
 
-/* Gray values at r radii, of all m angles or of each, between the two circles beside them: of k
-   targets, each in one of i images of c circles from `innermost` to `outermost`. */
-void gray_at(count k, count i, count c, count m, count r, count g, const float gray[i][c][m],
+/* Gray values at a radius, between the two circles beside it. */
+static void read_circle(count c, count m, const float image[c][m], double innermost,
+                        double outermost, double radius, float *restrict values)
+{
+    float share;
+    count low = circle_below(c, innermost, outermost, radius, &share);
+    const float *below = image[low], *above = image[low + 1 < c ? low + 1 : low];
+    for (count a = 0; a < m; a++)
+        values[a] = below[a] * (1 - share) + above[a] * share;
+}
+
+/* Gray values at r radii of k targets, each in one of i images of c circles. */
+void gray_at(count k, count i, count c, count m, count r, const float gray[i][c][m],
              const int64_t row[k], double innermost, const double outermost[k],
-             const double radii[k][r][g], float values[k][r][m])
+             const double radii[k][r], float values[k][r][m])
 {
     for (count b = 0; b < k; b++)
-        for (count j = 0; j < r; j++) {
-            const float *below = NULL, *above = NULL;
-            float share = 0;
-            for (count a = 0; a < m; a++) {
-                if (a == 0 || g > 1) {
-                    count low = circle_below(c, innermost, outermost[b], radii[b][j][a], &share);
-                    below = gray[within(row[b], i)][low];
-                    above = gray[within(row[b], i)][low + 1 < c ? low + 1 : low];
-                }
-                values[b][j][a] = below[a] * (1 - share) + above[a] * share;
-            }
-        }
+        for (count j = 0; j < r; j++)
+            read_circle(c, m, gray[within(row[b], i)], innermost, outermost[b], radii[b][j],
+                        values[b][j]);
 }
 
 /* What is read at an edge of a band, on ground and on the band: gray values; shares of ink that
@@ -62,12 +63,9 @@ static void read_ring(count c, count m, const float image[c][m], const numbers *
                       float *restrict marked)
 {
     double blur = it->blur / it->size, dot, band;
-    float share;
-    count low = circle_below(c, of->innermost, it->outermost, radius, &share);
-    const float *below = image[low], *above = image[low + 1 < c ? low + 1 : low];
+    read_circle(c, m, image, of->innermost, it->outermost, radius, gray);
     ink_at(edges, blur, radius, &dot, &band);
     for (count a = 0; a < m; a++) {
-        gray[a] = below[a] * (1 - share) + above[a] * share;
         bare[a] = (float)dot;
         marked[a] = (float)(dot + band);
     }
@@ -76,7 +74,8 @@ static void read_ring(count c, count m, const float image[c][m], const numbers *
             continue;
         double at = ground ? on_ground(radius, plate[a], edges[2]) : radius;
         double beyond = 1 - blurred((plate[a] - at) / blur);
-        low = circle_below(c, of->innermost, it->outermost, at, &share);
+        float share;
+        count low = circle_below(c, of->innermost, it->outermost, at, &share);
         ink_at(edges, blur, at, &dot, &band);
         gray[a] = image[low][a] * (1 - share) + image[low + 1 < c ? low + 1 : low][a] * share;
         bare[a] = (float)(dot + beyond);
@@ -111,29 +110,23 @@ static void read_edges(count c, count m, const float image[c][m], const numbers 
 
 /* Probability of an edge of light between neighbours, as two circles in the gap show it. */
 static double light_edges(count c, count m, const float image[c][m], const numbers *of,
-                          const target *it, const double edges[3])
+                          const target *it, const double edges[3], float circles[2][m])
 {
-    const float *below[2], *above[2];
-    float share[2];
+    float least = (float)(of->light_edge * of->light_edge), offset = (float)of->offset;
+    float noise = (float)it->noise, many = 0;
     for (int side = 0; side < 2; side++) {
         double at = edges[0] + (edges[1] - edges[0]) * of->across[side];
-        count low = circle_below(c, of->innermost, it->outermost, at, &share[side]);
-        below[side] = image[low];
-        above[side] = image[low + 1 < c ? low + 1 : low];
+        read_circle(c, m, image, of->innermost, it->outermost, at, circles[side]);
     }
-    float least = (float)(of->light_edge * of->light_edge), offset = (float)of->offset;
-    float noise = (float)it->noise, edge_count = 0;
     for (count a = 0; a < m; a++) {
-        float first = below[0][a] * (1 - share[0]) + above[0][a] * share[0];
-        float second = below[1][a] * (1 - share[1]) + above[1][a] * share[1];
-        first = greater_f(first, 0) + offset;
-        second = greater_f(second, 0) + offset;
+        float first = greater_f(circles[0][a], 0) + offset;
+        float second = greater_f(circles[1][a], 0) + offset;
         float step = logarithm_f(first / second);
         float of_first = noise / first, of_second = noise / second;
         float noisy = least + 4 * (of_first * of_first + of_second * of_second);
-        edge_count += step * step > noisy ? 1.0f : 0.0f;
+        many += step * step > noisy ? 1.0f : 0.0f;
     }
-    return lesser(greater(edge_count / (double)m, of->least_doubt), of->most_doubt);
+    return lesser(greater(many / (double)m, of->least_doubt), of->most_doubt);
 }
 
 /* How steps of ln at an edge are spread: density of anything; the step of a mark; deviation of
@@ -293,7 +286,7 @@ void edge_evidence(count k, count i, count c, count m, count n, const float gray
     for (count b = 0; b < k; b++) {
         const float(*image)[m] = gray[within(row[b], i)];
         memcpy(&it, looks_of[b], sizeof it);
-        lit[b] = (float)light_edges(c, m, image, &of, &it, edges[b]);
+        lit[b] = (float)light_edges(c, m, image, &of, &it, edges[b], steps);
         look seen = look_of(&of, &it, lit[b]);
         read_edges(c, m, image, &of, &it, edges[b], reach[b], plate[b], weight[b], read);
         for (int side = 0; side < 2; side++) {
@@ -322,7 +315,8 @@ void shifted_evidence(count k, count i, count c, count m, count s, const float g
             const float(*image)[m] = gray[within(row[b], i)];
             const double *at = edges[b][shift];
             memcpy(&it, looks_of[b], sizeof it);
-            look seen = look_of(&of, &it, (float)light_edges(c, m, image, &of, &it, at));
+            float lit = (float)light_edges(c, m, image, &of, &it, at, steps);
+            look seen = look_of(&of, &it, lit);
             read_edges(c, m, image, &of, &it, at, reach[b], plate[b], weight[b], read);
             for (int side = 0; side < 2; side++)
                 step_odds(m, 2, seen, shares, read, side, steps, of_edges[side]);

@@ -10,38 +10,33 @@ static inline count around(int64_t i, count n) { return (count)((i % n + n) % n)
 static const float NEVER = -1e30f;
 
 /* Readings of which none counts too much: sums over halves h of the band, bounded by a multiple of
-   their weight, as light may do anything at any angle. */
+   their weight, as light may do anything at any angle. For shares of ink between paper, the first,
+   and ink, the last, they are the best ones within `reach` steps: the phase of sectors is known to
+   no better. */
 void bounded_readings(count k, count h, count n, count m, const float values[k][h][n][m],
-                      const float most[k], float bounded[k][n][m])
+                      const float most[k], const int64_t reach[k], float best[k][n][m],
+                      float bounded[n][m])
 {
-    for (count b = 0; b < k; b++)
+    for (count b = 0; b < k; b++) {
         for (count s = 0; s < n; s++) {
             for (count a = 0; a < m; a++)
-                bounded[b][s][a] = 0;
+                bounded[s][a] = 0;
             for (count half = 0; half < h; half++)
                 for (count a = 0; a < m; a++)
-                    bounded[b][s][a] += values[b][half][s][a];
+                    bounded[s][a] += values[b][half][s][a];
             for (count a = 0; a < m; a++)
-                bounded[b][s][a] = most[b] * hyperbolic_tangent_f(bounded[b][s][a] / most[b]);
+                bounded[s][a] = most[b] * hyperbolic_tangent_f(bounded[s][a] / most[b]);
         }
-}
-
-/* Evidence for shares of ink, the best one within `reach` steps of each between paper, the first,
-   and ink, the last: the phase of sectors is known to no better. */
-void best_near_shares(count k, count n, count m, const float looks[k][n][m],
-                      const int64_t reach[k], float best[k][n][m])
-{
-    for (count b = 0; b < k; b++)
         for (count s = 0; s < n; s++) {
             int64_t away = s == 0 || s == n - 1 ? 0 : reach[b] < n - 2 ? reach[b] : n - 2;
             count low = within(s - away, n), high = within(s + away, n);
-            for (count a = 0; a < m; a++) {
-                float highest = looks[b][s][a];
-                for (count near = low; near <= high; near++)
-                    highest = greater_f(highest, looks[b][near][a]);
-                best[b][s][a] = highest;
-            }
+            for (count a = 0; a < m; a++)
+                best[b][s][a] = bounded[s][a];
+            for (count near = low; near <= high; near++)
+                for (count a = 0; a < m; a++)
+                    best[b][s][a] = greater_f(best[b][s][a], bounded[near][a]);
         }
+    }
 }
 
 /* Evidence for a one over a zero in each of n sectors, and what a pair of ones adds, at p phases,

@@ -15,12 +15,6 @@ void logarithms(count n, const double x[n], double y[n])
         y[i] = logarithm(x[i]);
 }
 
-void hyperbolic_tangents(count n, const double x[n], double y[n])
-{
-    for (count i = 0; i < n; i++)
-        y[i] = hyperbolic_tangent(x[i]);
-}
-
 void normal_shares(count n, const double x[n], double y[n])
 {
     for (count i = 0; i < n; i++)

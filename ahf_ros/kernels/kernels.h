@@ -21,7 +21,6 @@ static inline count within(int64_t i, count n) { return i < 0 ? 0 : i < n ? (cou
 
 void exponentials(count n, const double x[n], double y[n]);
 void logarithms(count n, const double x[n], double y[n]);
-void hyperbolic_tangents(count n, const double x[n], double y[n]);
 void normal_shares(count n, const double x[n], double y[n]);
 void exponentials_f(count n, const float x[n], float y[n]);
 void logarithms_f(count n, const float x[n], float y[n]);
@@ -42,9 +41,9 @@ void ground_votes(count k, count i, count c, count m, count s, const float gray[
 
 /* band_edges.c */
 
-void gray_at(count k, count i, count c, count m, count r, count g, const float gray[i][c][m],
+void gray_at(count k, count i, count c, count m, count r, const float gray[i][c][m],
              const int64_t row[k], double innermost, const double outermost[k],
-             const double radii[k][r][g], float values[k][r][m]);
+             const double radii[k][r], float values[k][r][m]);
 void edge_evidence(count k, count i, count c, count m, count n, const float gray[i][c][m],
                    const int64_t row[k], const double reach[k][m], const double plate[k][m],
                    const double looks_of[k][8], const double edges[k][3], const float weight[k],
@@ -81,9 +80,8 @@ void unlike_shares(count k, count i, count c, count m, count n, const float gray
 /* bands.c */
 
 void bounded_readings(count k, count h, count n, count m, const float values[k][h][n][m],
-                      const float most[k], float bounded[k][n][m]);
-void best_near_shares(count k, count n, count m, const float looks[k][n][m],
-                      const int64_t reach[k], float best[k][n][m]);
+                      const float most[k], const int64_t reach[k], float best[k][n][m],
+                      float bounded[n][m]);
 void sector_evidence(count k, count m, count p, count n, const float inked[k][m],
                      const double rising[k][2][p], const double falling[k][2][p], double ones[k][p][n],
                      double pairs[k][p][n]);

@@ -163,7 +163,7 @@ def by_levels(
 ) -> Evidence:
     """Return what levels say under light of a known spread; None: light as it is seen."""
     radii = np.array([0.5, 1.6, 2.6, 3.1, 3.9])
-    values = of.at(radii[None, :, None])
+    values = of.at(radii[None])
     known = values if light is None else np.full_like(values, light)
     known = known, np.full_like(values, spread)
     return level_evidence(of, values, *known, radii, NONE, BAND, shares)

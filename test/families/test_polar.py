@@ -53,15 +53,15 @@ def test_circles_are_read_between_two_others() -> None:
     rising = np.broadcast_to(radii.astype(np.float32)[:, None], of.gray.shape)
     slope = replace(of, gray=rising)
     for radius in (0.3, 1.234, of.outermost[0] - 0.01):
-        assert slope.at(np.array([[[radius]]])) == pytest.approx(radius, abs=1e-5)
+        assert slope.at(np.array([[radius]])) == pytest.approx(radius, abs=1e-5)
 
 
 def test_polar_images_at_the_right_border() -> None:
     image = polar(np.where(np.hypot(X - 60, Y - 60) < 12, 50, 200)[:, :100])
     assert image.contrast[0] == pytest.approx(0.25, abs=0.05)
     assert image.size[0] == pytest.approx(12, abs=0.3)
-    assert image.at(np.array([[[0.6]]])) == pytest.approx(50, abs=2)
-    assert image.at(np.array([[[2.0]]]))[0][image.reach >= sum(BAND) / 2] == pytest.approx(
+    assert image.at(np.array([[0.6]])) == pytest.approx(50, abs=2)
+    assert image.at(np.array([[2.0]]))[0][image.reach >= sum(BAND) / 2] == pytest.approx(
         200, abs=2
     )
     # Counter-clockwise as seen, from +x: first out of the image, then in it, then out of it again.

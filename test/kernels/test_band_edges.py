@@ -44,13 +44,11 @@ def test_readings_lie_between_two_circles(seed: int) -> None:
     i, c, m, k, r = 2, 1 + seed, 5, 3, 2
     gray = generator.uniform(0, 255, (i, c, m)).astype(np.float32)
     row, outermost = generator.integers(0, i, k), np.full(k, 4.0)
-    for g in (1, m):
-        radii = generator.uniform(0, 5, (k, r, g))
-        values = kernels.gray_at(gray, row, 0.3, outermost, radii)
-        for b, j, a in itertools.product(range(k), range(r), range(m)):
-            at = radii[b, j, a % g]
-            expected = np.interp(at, np.linspace(0.3, 4.0, c), gray[row[b], :, a])
-            assert values[b, j, a] == pytest.approx(expected, rel=1e-5)
+    radii = generator.uniform(0, 5, (k, r))
+    values = kernels.gray_at(gray, row, 0.3, outermost, radii)
+    for b, j, a in itertools.product(range(k), range(r), range(m)):
+        expected = np.interp(radii[b, j], np.linspace(0.3, 4.0, c), gray[row[b], :, a])
+        assert values[b, j, a] == pytest.approx(expected, rel=1e-5)
 
 
 # In the order of the C file.
@@ -256,7 +254,7 @@ def test_edges_are_tried_at_several_places() -> None:
 @pytest.mark.parametrize('value', [np.nan, np.inf, -np.inf])
 def test_no_value_leads_beyond_an_array(value: float) -> None:
     gray = np.full((1, 3, 4), value, np.float32)
-    radii = np.full((2, 1, 4), value)
+    radii = np.full((2, 1), value)
     values = kernels.gray_at(gray, np.array([-5, 99]), value, np.full(2, value), radii)
     assert values.shape == (2, 1, 4)
     finite = kernels.gray_at(np.ones_like(gray), np.array([-5, 99]), 0.3, np.full(2, 0.3), radii)

@@ -146,11 +146,11 @@ def test_readings_are_bounded_and_shares_take_the_best_near_them(seed: int) -> N
     generator, drawn = numbers(seed)
     k, n, m = 3, 2 + seed % 4, 5
     values, most = drawn(k, 2, n, m), np.abs(drawn(k)) + 1
-    bounded = kernels.bounded_readings(values, most)
+    bounded, _ = kernels.bounded_readings(values, most, np.zeros(k, int))
     wanted = most[:, None, None] * np.tanh(values.sum(axis=1) / most[:, None, None])
     assert bounded == pytest.approx(wanted, abs=1e-5)
     reach = generator.integers(-1, 5, k)
-    best = kernels.best_near_shares(bounded, reach)
+    best, _ = kernels.bounded_readings(values, most, reach)
     for b, s, a in itertools.product(range(k), range(n), range(m)):
         away = max(0, min(reach[b], n - 2)) if 0 < s < n - 1 else 0
         near = bounded[b, max(s - away, 0) : s + away + 1, a]
@@ -218,5 +218,5 @@ def test_no_value_leads_beyond_an_array(value: float) -> None:
     kernels.hidden_angles(looks, steps[:, 0], first, *of_paths)
     kernels.free_arcs(looks, first, row[:, 0], value, row[:, 0])
     kernels.best_moves(looks, steps[:, 0], np.full((2, 6), -9), np.full((2, 6), 99))
-    kernels.best_near_shares(looks, np.array([-(1 << 62), 1 << 62]))
+    kernels.bounded_readings(looks[:, None], [1.0, 1.0], np.array([-(1 << 62), 1 << 62]))
     kernels.word_steps([[5]], [[-(1 << 62)]], [[[value]] * 2], [[[value]] * 2], 1 << 40, n=6, m=6)

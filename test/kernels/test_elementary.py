@@ -17,7 +17,6 @@ Values = np.ndarray
         ('exponentials', math.exp, (-708.0, 709.0), 3e-16),
         ('logarithms', math.log, (1e-300, 1e300), 3e-16),
         ('logarithms', math.log, (0.5, 2.0), 3e-16),
-        ('hyperbolic_tangents', math.tanh, (-30.0, 30.0), 1e-15),
         ('normal_shares', lambda x: math.erfc(-x / math.sqrt(2)) / 2, (-9.0, 9.0), 1.5e-7),
         ('exponentials_f', math.exp, (-87.0, 88.0), 2e-7),
         ('logarithms_f', math.log, (1e-37, 3e38), 2e-7),

@@ -37,13 +37,18 @@ def with_ends(polar: PolarImages, words: Words, overhang: np.ndarray, family: Ri
     """
     inner, outer = family.band
     radii = inner + (outer - inner) * np.tile(DEPTHS, (len(overhang), 1))
-    levels = polar.at(radii[..., None]).mean(axis=1)
+    levels = polar.at(radii).mean(axis=1)
     odds, beside, unseen = _ends(polar, levels, words, overhang, family)
-    other, _, unseen_of_other = _ends(polar, levels, words.as_they_look(), overhang, family)
-    ahead = words.ahead + other - odds - _UNSEEN * (unseen_of_other - unseen)
-    margin = np.where(words.other == words.words, np.inf, _RARE - ahead)
+    some, margin = np.flatnonzero(words.other != words.words), words.margin.copy()
+    if some.size:
+        looks = words.select(some).as_they_look()
+        other, _, unseen_of_other = _ends(
+            polar.select(some), levels[some], looks, overhang[some], family
+        )
+        ahead = other - odds[some] - _UNSEEN * (unseen_of_other - unseen[some])
+        margin[some] = np.minimum(margin[some], _RARE - looks.ahead - ahead)
     coded = words.coded + odds + np.maximum(words.beside + beside - odds - _MOVED, 0)
-    return replace(words, margin=np.minimum(words.margin, margin), coded=coded)
+    return replace(words, margin=margin, coded=coded)
 
 
 def _ends(

@@ -302,10 +302,10 @@ def without_outliers(evidence: Evidence) -> Evidence:
     Light may do anything at any angle. The phase of sectors is known to about half an angle, which
     is some share of ink where arcs end, so that the evidence for such shares is the best one near.
     """
-    looks, typical = (_bounded(of, evidence.weight) for of in (evidence.looks, evidence.typical))
     error = _PHASE / np.sqrt(2 * np.pi) / np.hypot(evidence.blur, _PHASE)
-    reach = np.rint(error * (looks.shape[1] - 1)).astype(np.int64)
-    return replace(evidence, looks=kernels.best_near_shares(looks, reach), typical=typical)
+    reach = np.rint(error * (evidence.looks.shape[2] - 1)).astype(np.int64)
+    looks = _bounded(evidence.looks, evidence.weight, reach)
+    return replace(evidence, looks=looks, typical=_bounded(evidence.typical, evidence.weight))
 
 
 def _typical(evidence: Evidence, inked: np.ndarray, hidden: np.ndarray) -> np.ndarray:
@@ -315,9 +315,17 @@ def _typical(evidence: Evidence, inked: np.ndarray, hidden: np.ndarray) -> np.nd
     return np.asarray(of_angles.sum(axis=1, dtype=np.float64))
 
 
-def _bounded(readings: np.ndarray, weight: np.ndarray) -> np.ndarray:
-    """Return the sums of halves (k, 2, n, m), none of which counts too much, (k, n, m)."""
-    return kernels.bounded_readings(readings, np.float32(_MAXIMUM_READING) * weight)
+def _bounded(
+    readings: np.ndarray, weight: np.ndarray, reach: np.ndarray | None = None
+) -> np.ndarray:
+    """Return the sums of halves (k, 2, n, m), none of which counts too much, (k, n, m).
+
+    Within `reach` of shares between, (k,), the best ones.
+    """
+    reach = np.zeros(len(weight), np.int64) if reach is None else reach
+    most = np.float32(_MAXIMUM_READING) * weight
+    bounded: np.ndarray = kernels.bounded_readings(readings, most, reach)[0]
+    return bounded
 
 
 def _half_paper(evidence: Evidence) -> np.ndarray:

@@ -129,10 +129,7 @@ class PolarImages(ArrayRecord):
         return np.stack([inside, self.plate + aside / 2], axis=1)
 
     def at(self, radii: np.ndarray) -> np.ndarray:
-        """Return gray values at radii (k, r, m) or, on circles, (k, r, 1), (k, r, m).
-
-        The radii are in dot radii.
-        """
+        """Return gray values at radii (k, r), dot radii, at all angles, (k, r, m)."""
         return kernels.gray_at(self.gray, self.row, INNERMOST, self.outermost, radii)
 
     def inked(self, paper: np.ndarray, seen: np.ndarray) -> np.ndarray:
@@ -318,7 +315,7 @@ def on_dark_ground(
     if not bright.size:
         return polar
     some = polar.select(bright)
-    gap = some.at(np.tile(1 + (inner - 1) * GAP, (len(bright), 1))[..., None]).mean(axis=1)
+    gap = some.at(np.tile(1 + (inner - 1) * GAP, (len(bright), 1))).mean(axis=1)
     aside = np.maximum(SOFT_EDGE * some.blur / some.size, _ASIDE)
     step = np.exp(-_WHITE * np.log(some.contrast))[:, None].astype(np.float32)
     white = (np.maximum(gap, 0) + np.float32(LOG_OFFSET)) * step - np.float32(LOG_OFFSET)

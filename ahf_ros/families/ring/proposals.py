@@ -230,8 +230,7 @@ def _holes(polar: PolarImages, outer: np.ndarray) -> np.ndarray:
         (outer[bright, :, None] + MARGIN).reshape(bright.size, -1),
     )
     inside, outside = (
-        polar.levels(polar.at(radii[..., None]))
-        for radii in (np.tile(DOT, (bright.size, 1)), beyond)
+        polar.levels(polar.at(radii)) for radii in (np.tile(DOT, (bright.size, 1)), beyond)
     )
     usual = medians(inside.reshape(bright.size, -1))[:, None, None]
     alike = (np.abs(outside - usual) < _ALIKE).mean(axis=2) > _BEYOND
