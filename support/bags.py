@@ -32,6 +32,15 @@ def scenes(count: int, **changes: Any) -> list[np.ndarray]:
     return [render(SceneSettings(**(SCENE | changes), seed=seed)).image for seed in range(count)]
 
 
+def moving(count: int) -> list[np.ndarray]:
+    """Return images of a wall that a camera passes, which show the same targets."""
+    scene = SceneSettings(**(SCENE | {'width': 520, 'height': 400, 'targets': 6}), ambient=0.5)
+    wall, generator = render(scene).image, np.random.default_rng(5)
+    shown = (wall[40 + it : 360 + it, 40 + 2 * it : 480 + 2 * it] for it in range(count))
+    noisy = (it + generator.normal(0.0, 1.5, it.shape) for it in shown)
+    return [np.clip(np.rint(it), 0, 255).astype(np.uint8) for it in noisy]
+
+
 def header(store: Typestore, time: int) -> Any:
     """Return the header of an image."""
     second, nanosecond = divmod(time, 10**9)

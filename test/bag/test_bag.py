@@ -213,6 +213,51 @@ def test_killed_and_finished_the_same(recording: Path, answered: Path, tmp_path:
     assert contents(target) == contents(answered)
 
 
+def test_targets_are_followed_through_interruptions(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    messages = bags.recorded(typestore(), bags.moving(5))
+    messages[5][3].encoding = 'unheard of'  # of the third image, which leaves all as it was
+    source = bags.write_ros2(tmp_path / 'in', messages)
+    whole, often = tmp_path / 'whole' / 'out', tmp_path / 'often' / 'out'
+    assert status(source, whole, *FAMILY) == 1
+    counts = [sum(it.followed for it in answer.targets) for _, answer in bags.answers(whole)]
+    assert counts[0] == counts[2] == 0
+    assert min(counts[1], *counts[3:]) >= 3
+    append = output.Journal.append
+
+    def interrupted(journal: output.Journal, *entry: Any) -> None:
+        append(journal, *entry)
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr(output.Journal, 'append', interrupted)
+        for _ in messages[1::2]:
+            assert status(source, often, *FAMILY) == 130
+    assert status(source, often, *FAMILY) == 1
+    assert contents(often) == contents(whole)
+
+
+def test_a_damaged_memory_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    source = bags.write_ros2(tmp_path / 'in', bags.recorded(typestore(), bags.moving(2)))
+    append = output.Journal.append
+
+    def damaged(journal: output.Journal, *entry: Any) -> None:
+        append(journal, *entry)
+        with journal._database as database:
+            database.execute("UPDATE seen SET known = known || ' '")
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr(output.Journal, 'append', damaged)
+        assert status(source, tmp_path / 'out', *FAMILY) == 130
+    capfd.readouterr()
+    assert status(source, tmp_path / 'out', *FAMILY) == 1
+    assert 'what was seen last is damaged' in capfd.readouterr().err
+
+
 @pytest.mark.parametrize(
     ('module', 'name'),
     [(run, 'begin'), (output, '_write'), (Path, 'replace'), (run, 'remove_unfinished')],
