@@ -44,6 +44,7 @@ _SEVERAL = 4.0  # power of their number, one in which each of several groups is 
 _ALONE = 2.9  # ... one marker alone shows
 _OF_PLAIN = 4.5  # the most that a marker which letters look like shows, logarithmic odds
 _LARGER = 6.9  # logarithmic odds against a larger dictionary where most markers are of a smaller
+_PRINTED = 4.5  # size of a cell, px, below which a whole print tells more than edges do
 _LARGE = 120.0  # side of a marker whose contour gives its corners to about two pixels, px
 
 Groups = tuple[tuple[str, ...], ...]
@@ -131,8 +132,7 @@ class SquareDetector(ExpectingDetector):
             alike = [it for it, of in zip(markers, prints, strict=True) if len(of) == cells]
             corners = np.array([it.corners for it in alike])
             ink = np.array([of for of in prints if len(of) == cells])
-            fit = fit_markers(gray, _from_halves(gray, corners, ink), ink)
-            fit = lay_prints(gray, fit, ink)
+            fit = _fitted(gray, _from_halves(gray, corners, ink), ink)
             places = _places(fit.corners, fit.covariance, fit.edge_shift)
             shown = decision_margins(gray, fit.corners, ink)
             for place, wrong, margin in zip(places, *(it.tolist() for it in shown), strict=True):
@@ -249,6 +249,14 @@ def _places_of(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """
     diagonals = np.linalg.norm(corners[:, 2:] - corners[:, :2], axis=2)
     return corners.mean(axis=1), _SAME_PLACE * diagonals.max(axis=1)
+
+
+def _fitted(gray: np.ndarray, corners: np.ndarray, ink: np.ndarray) -> Places:
+    """Return markers, with corners of shape (k, 4, 2), placed by whatever tells most of them."""
+    fit = lay_prints(gray, Places.unmeasured(corners), ink, _PRINTED)
+    rest = fit.share == 0
+    edges = fit_markers(gray, corners[rest], ink[rest])
+    return fit.replaced(rest, lay_prints(gray, edges, ink[rest]))
 
 
 def _from_halves(gray: np.ndarray, corners: np.ndarray, ink: np.ndarray) -> np.ndarray:

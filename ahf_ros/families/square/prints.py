@@ -30,6 +30,7 @@ from ahf_ros.vision.robust import NORMAL
 _CELLS = 8  # of a marker whose cells are not known
 _MARGIN = 0.6  # of paper around a print that is looked at, cells
 _LARGEST_CELL = 12.0  # whose few edges are measured better in profiles, px
+_EXACT = 0.01  # deviation of edges, px, where those of prints were larger: 600 markers, 3.5 to 10 px
 _SAMPLES = 4  # along a cell, at most a pixel apart where it is smaller
 _OF_OUTLINE = 2  # samples along a cell of a small marker
 _ROUNDS = 10
@@ -45,7 +46,9 @@ _RIDGE = 1e-6  # of diagonals of normal matrices, so that they can be inverted
 _BLUR, _PAPER, _STEP, _GROWTH = 8, 9, 12, 15  # of the unknowns: in sides, gray values, and sides
 
 
-def lay_prints(gray: np.ndarray, markers: Places, prints: np.ndarray) -> Places:
+def lay_prints(
+    gray: np.ndarray, markers: Places, prints: np.ndarray, largest: float = _LARGEST_CELL
+) -> Places:
     """Return markers as their prints lie over the image, where these are better determined.
 
     Parameters
@@ -56,14 +59,17 @@ def lay_prints(gray: np.ndarray, markers: Places, prints: np.ndarray) -> Places:
         The k markers as their edges show them, or with corners to about a third of a cell.
     prints : ndarray of bool, shape (k, n, n)
         Their cells, borders included, True where there is ink.
+    largest : float
+        Size of a cell, px, up to which prints are laid.
     """
     cells = prints.shape[1]
     cell = side_lengths(markers.corners).mean(axis=1) / cells
     counts = np.clip(np.ceil(cell), 1, _SAMPLES).astype(int)
     of_edges = np.trace(markers.covariance, axis1=1, axis2=2)
     deviation = np.where(markers.share > 0, of_edges, np.inf)
-    for count in np.unique(counts).tolist():
-        which = np.flatnonzero((counts == count) & (cell <= _LARGEST_CELL))
+    tried = (cell <= largest) & (deviation > _EXACT**2)
+    for count in np.unique(counts[tried]).tolist():
+        which = np.flatnonzero(tried & (counts == count))
         found = _laid(gray, markers.corners[which], prints[which], count, cells)
         own = np.trace(found.covariance, axis1=1, axis2=2)
         better = (found.share >= _ENOUGH) & (own < deviation[which])
