@@ -249,6 +249,17 @@ void cctag_rings(count k, count c, count n, const double circles[k][c], const do
                  float by_shift[k][n], float by_blur[k][n], float by_sharpening[k][n],
                  float row[2][n]);
 
+/* outlines.c */
+
+/* Areas, px^2, positive where they are clockwise in an image, lengths and boxes, px. */
+void outline_sizes(count n, count k, const int32_t points[n][2], const int64_t ends[k],
+                   double areas[k], double lengths[k], int64_t boxes[k][2]);
+/* Lines, by their ends, through the points that are near to the middle of four sides, moved outwards;
+   and how many points the side with fewest has. */
+void side_lines(count n, count k, const int32_t points[n][2], const int64_t ends[k],
+                const double sides[k][4][2][2], const double near[k], const double outwards[k],
+                double middle, double least, double lines[k][4][2][2], double fewest[k]);
+
 /* square_places.c */
 
 void square_frames(count k, const double corners[k][4][2], double frames[k][3][3]);

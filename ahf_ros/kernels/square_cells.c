@@ -82,21 +82,22 @@ static void set_levels(count h, count w, count s, const uint8_t gray[h][w],
                 double y = ((double)row - middle + places[part][1]) / side;
                 levels[part][row][column] = sampled(h, w, gray, frame, x, y);
             }
-    double *whole = levels[0][0];
-    for (count cell = 0; cell < s * s; cell++) {
-        double sum = 0, least = whole[cell];
-        for (int part = 1; part < PARTS; part++) {
-            sum += levels[part][0][cell];
-            least = lesser(least, levels[part][0][cell]);
+    for (count row = 0; row < s; row++)
+        for (count column = 0; column < s; column++) {
+            double sum = 0, least = levels[0][row][column];
+            for (int part = 1; part < PARTS; part++) {
+                sum += levels[part][row][column];
+                least = lesser(least, levels[part][row][column]);
+            }
+            levels[0][row][column] = spread ? least : sum / (PARTS - 1);
         }
-        whole[cell] = spread ? least : sum / (PARTS - 1);
-    }
     unmix(s, shares[1], levels[0], scale);
     transpose(s, levels[0]);
     unmix(s, shares[0], levels[0], scale);
     transpose(s, levels[0]);
+    double *all = levels[0][0];
     for (count cell = 0; cell < PARTS * s * s; cell++)
-        levels[0][0][cell] = logarithm(greater(levels[0][0][cell], 0) + offset);
+        all[cell] = logarithm(greater(all[cell], 0) + offset);
 }
 
 /* Cells of the border, and of paper beside it. */

@@ -30,7 +30,9 @@ from ahf_ros.vision.robust import NORMAL
 _CELLS = 8  # of a marker whose cells are not known
 _MARGIN = 0.6  # of paper around a print that is looked at, cells
 _LARGEST_CELL = 12.0  # whose few edges are measured better in profiles, px
-_EXACT = 0.01  # deviation of edges, px, where those of prints were larger: 600 markers, 3.5 to 10 px
+_EXACT = (
+    0.01  # deviation of edges, px, where those of prints were larger: 600 markers, 3.5 to 10 px
+)
 _SAMPLES = 4  # along a cell, at most a pixel apart where it is smaller
 _OF_OUTLINE = 2  # samples along a cell of a small marker
 _ROUNDS = 10

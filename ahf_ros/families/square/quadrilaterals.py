@@ -14,9 +14,10 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
+from ahf_ros import kernels
 from ahf_ros.families.square.frames import meet
 from ahf_ros.vision.logarithm import LOG_OFFSET
-from ahf_ros.vision.outlines import measured, points_of
+from ahf_ros.vision.outlines import ends_of, measured, points_of
 from ahf_ros.vision.sampling import sample
 
 _WINDOW = 13  # in which a pixel is compared, px
@@ -32,7 +33,7 @@ _SAME_LINE = 0.15, 0.03  # sides of one line: sine of their angle, distance in p
 _NEAR = 0.02, 1.2  # of points that belong to a side, as a share of the perimeter, and px
 _ENDS = 0.1  # of a side, left out at its ends, where blur rounds the corner
 _FEWEST = 3  # points of a side
-_TOGETHER = 200  # regions that lines are fitted to at a time, which bounds the memory
+_LEAST = 1e-9  # sum of squares of places along a side, that a slope is divided by
 _COMMON_AREA = 0.6, 1.9  # of a quadrilateral, as a share of its region's
 _DEPTH, _SIDE = 0.12, 0.2  # of samples beside a side, to the middle; share of them with a step
 _ALONG = np.linspace(0.06, 0.94, 10)  # a side, where they are
@@ -204,45 +205,9 @@ def _fitted(regions: _Regions, which: np.ndarray, sides: np.ndarray) -> np.ndarr
 
     Regions are left out that have a side with few points.
     """
-    fitted = [np.zeros((0, 4, 2, 2))]
-    for start in range(0, len(which), _TOGETHER):
-        some = slice(start, start + _TOGETHER)
-        fitted.append(_lines(regions, which[some], sides[some]))
-    return np.concatenate(fitted)
-
-
-def _lines(regions: _Regions, which: np.ndarray, sides: np.ndarray) -> np.ndarray:
     outlines = [regions.outlines[index] for index in which]
-    counts = [*map(len, outlines)]
-    first = np.cumsum([0, *counts[:-1]])
-    points = points_of(outlines).astype(np.float64)
-    vectors = sides[:, :, 1] - sides[:, :, 0]
-    lengths = np.hypot(vectors[..., 0], vectors[..., 1])
-    along = vectors / lengths[..., None]
-    normals = np.stack([along[..., 1], -along[..., 0]], axis=2)
     near = np.maximum(_NEAR[0] * regions.lengths[which], _NEAR[1])
-
-    def of_points(values: np.ndarray) -> np.ndarray:
-        return np.repeat(values, counts, axis=0)
-
-    def coordinates(axes: np.ndarray) -> np.ndarray:
-        """Return the distances of points from the starts of sides, along axes, (n, 4)."""
-        there = (axes * sides[:, :, 0]).sum(axis=2)
-        x, y = (of_points(axes[..., axis]) for axis in (0, 1))
-        return x * points[:, :1] + y * points[:, 1:] - of_points(there)
-
-    offsets = coordinates(normals)
-    places = coordinates(along / lengths[..., None]) - 0.5
-    used = (np.abs(offsets) < of_points(near)[:, None]) & (np.abs(places) < 0.5 - _ENDS)
-
-    def total(values: np.ndarray) -> np.ndarray:
-        return np.add.reduceat(np.where(used, values, 0.0), first, axis=0)
-
-    count = np.maximum(total(np.ones_like(places)), 1)
-    middle, across = total(places) / count, total(offsets) / count
-    places -= of_points(middle)
-    slope = total(places * offsets) / np.maximum(total(places**2), 1e-9)
-    across += regions.growths[which, None]
-    ends = np.stack([across + slope * (end - middle) for end in (-0.5, 0.5)], axis=2)
-    lines = sides + ends[..., None] * normals[:, :, None]
-    return lines[count.min(axis=1) >= _FEWEST]
+    of_sides = sides, near, regions.growths[which], 0.5 - _ENDS, _LEAST
+    lines, fewest = kernels.side_lines(points_of(outlines), ends_of(outlines), *of_sides)
+    fitted: np.ndarray = lines[fewest >= _FEWEST]
+    return fitted
