@@ -1,5 +1,7 @@
 """Identification of square markers on rendered scenes."""
 
+from dataclasses import replace
+
 import cv2
 import numpy as np
 import pytest
@@ -351,6 +353,8 @@ def test_what_has_no_corners_or_no_sides_stays_where_it_is(detect: Detector) -> 
     markers = detect(shown.image)
     others = [Target(1, 1, 50.0, 60.0, 5.0, 5.0), Target(2, 2, -900.0, 60.0, 5.0, 5.0)]
     assert detect.refine(shown.image, others) == others
+    none = [replace(it, corners=((5.0, 5.0),) * 4) for it in markers]
+    assert detect.refine(shown.image, none) == none
     plain = np.tile(np.arange(1000, dtype=np.uint8), (750, 1))
     assert detect.refine(plain, markers) == markers
     assert detect.refine(shown.image, []) == []

@@ -265,7 +265,7 @@ def _from_halves(gray: np.ndarray, corners: np.ndarray, ink: np.ndarray) -> np.n
     The contour of a large marker gives its corners to a part of its side, not to two pixels.
     """
     sides = side_lengths(corners).max(axis=1)
-    levels = max(0, ceil(log2(sides.max() / _LARGE)))
+    levels = ceil(log2(max(sides.max() / _LARGE, 1.0)))
     corners = corners.astype(np.float64)
     halves = halved(gray, levels)
     for level in range(levels, 0, -1):

@@ -30,9 +30,8 @@ from ahf_ros.vision.robust import NORMAL
 _CELLS = 8  # of a marker whose cells are not known
 _MARGIN = 0.6  # of paper around a print that is looked at, cells
 _LARGEST_CELL = 12.0  # whose few edges are measured better in profiles, px
-_EXACT = (
-    0.01  # deviation of edges, px, where those of prints were larger: 600 markers, 3.5 to 10 px
-)
+# Deviation of edges, px, below which no print told more, of 600 markers with cells of 3.5 to 10 px.
+_EXACT = 0.01
 _SAMPLES = 4  # along a cell, at most a pixel apart where it is smaller
 _OF_OUTLINE = 2  # samples along a cell of a small marker
 _ROUNDS = 10
@@ -106,7 +105,7 @@ def _laid(
     places = np.linspace(-reach, reach, int(np.ceil((cells + 2 * _MARGIN) * count)) + 1)
     of_cells = np.clip(np.floor((places + 0.5) * cells), -1, cells).astype(np.int32) + 1
     inner = -1.0 if prints.shape[1] > 1 else 0.5 - 0.5 / cells
-    size = side_lengths(corners).mean(axis=1)
+    size = np.maximum(side_lengths(corners).mean(axis=1), 1.0)
     blurs = np.stack([USUAL_BLUR / size, _SHARPEST / size, 0 * size + _SOFTEST / cells], axis=1)
     of_steps = _LARGEST_STEP / cells, _SETTLED, _OUTLIER, NORMAL, _USUAL_RESIDUAL
     of_rounds = _AGREES, _HOPELESS, _RIDGE, _ROUNDS
@@ -125,6 +124,7 @@ def _laid(
     laid = project(frames, SQUARE)
     near = np.linalg.norm(laid - corners, axis=2).max(axis=1) < np.maximum(size / cells, _NEAR)
     blur, paper, step, growth = unknowns[:, [_BLUR, _PAPER, _STEP, _GROWTH]].T
+    step = np.where(share > 0, step, -1.0)
     contrast = (paper + step) / np.maximum(paper, 1)
     shift = growth_in_light(growth / step * size, blur * size, contrast)
     covariance = centre_covariance(frames, covariance)
