@@ -30,7 +30,7 @@ from ahf_ros.vision.robust import NORMAL
 _CELLS = 8  # of a marker whose cells are not known
 _MARGIN = 0.6  # of paper around a print that is looked at, cells
 _LARGEST_CELL = 12.0  # whose few edges are measured better in profiles, px
-# Deviation of edges, px, below which no print told more, of 600 markers with cells of 3.5 to 10 px.
+# Deviation of edges, px, below which no print told more: of 600 markers, cells of 3.5 to 10 px.
 _EXACT = 0.01
 _SAMPLES = 4  # along a cell, at most a pixel apart where it is smaller
 _OF_OUTLINE = 2  # samples along a cell of a small marker
