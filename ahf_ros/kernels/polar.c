@@ -90,7 +90,7 @@ void circle_values(count h, count w, count k, count r, count m, const float imag
 }
 
 /* The median size, at m points of targets, of the second difference of rows of the second difference
-   of columns. */
+   of columns; 0 in images that have none. */
 void second_differences(count h, count w, count k, count m, const float image[h][w],
                         const double frames[k][3][3], const double points[2][m], double medians[k],
                         double scratch[m])
@@ -99,20 +99,20 @@ void second_differences(count h, count w, count k, count m, const float image[h]
     places at;
     float along[3][POINTS], centre[3];
     for (count b = 0; b < k; b++) {
+        medians[b] = 0;
+        if (h < 3 || w < 3)
+            continue;
         for (count start = 0; start < m; start += POINTS) {
             count n = m - start < POINTS ? m - start : POINTS;
             project(n, frames[b], &points[0][start], &points[1][start], along, centre);
             place(h, w, n, along, centre, 1, &at);
             for (count a = 0; a < n; a++) {
-                int64_t top = at.top[a] + (at.down[a] > 0.5f) - 1;
-                int64_t left = at.left[a] + (at.across[a] > 0.5f) - 1;
-                top = top < h - 3 ? top : h - 3;
-                left = left < w - 3 ? left : w - 3;
+                count top = within(at.top[a] + (at.down[a] > 0.5f) - 1, h - 2);
+                count left = within(at.left[a] + (at.across[a] > 0.5f) - 1, w - 2);
                 float sum = 0;
                 for (int down = 0; down < 3; down++)
                     for (int across = 0; across < 3; across++)
-                        sum += second[down] * second[across] *
-                               image[within(top + down, h)][within(left + across, w)];
+                        sum += second[down] * second[across] * image[top + down][left + across];
                 scratch[start + a] = fabsf(sum);
             }
         }

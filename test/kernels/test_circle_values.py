@@ -51,16 +51,17 @@ def test_noise_is_measured_by_second_differences(shape: tuple[int, int]) -> None
     frames[:, :2, 2] = generator.uniform(2, 20, (2, 2)).round()
     points = generator.integers(-4, 5, (2, 90)).astype(float)
     medians, _ = kernels.second_differences(image, frames, points)
-    padded = np.pad(image, ((0, max(3 - shape[0], 0)), (0, max(3 - shape[1], 0))), 'edge')
-    height, width = padded.shape
+    if min(shape) < 3:
+        assert medians.tolist() == [0, 0]
+        return
+    height, width = shape
     for b in range(2):
         sizes = []
         for x, y in (frames[b, :2, 2:] + points).T.astype(int):
             left, top = min(max(x - 1, 0), width - 3), min(max(y - 1, 0), height - 3)
-            part = padded[top : top + 3, left : left + 3]
+            part = image[top : top + 3, left : left + 3]
             sizes.append(abs(np.array([1, -2, 1]) @ part @ [1, -2, 1]))
-        if min(shape) >= 3:
-            assert medians[b] == pytest.approx(np.median(sizes))
+        assert medians[b] == pytest.approx(np.median(sizes))
 
 
 @pytest.mark.parametrize('seed', range(6))
