@@ -14,7 +14,7 @@ static bool marked(int64_t word, count n, count m, count angle, int64_t longer)
 {
     count p = m > n ? m / n : 1, reach = longer > m ? m : longer < -m ? m : llabs(longer);
     for (count a = angle + m - reach; a <= angle + m + reach; a++)
-        if ((word >> within(a % m / p, n) & 1) == (longer > 0))
+        if ((word >> within(a % m / p, n < 63 ? n : 63) & 1) == (longer > 0))
             return longer > 0;
     return longer <= 0;
 }
