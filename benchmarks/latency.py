@@ -1,9 +1,11 @@
 """How long a stream of images waits for its answers, and how fast it may be without a loss.
 
-Images under stripes that stay as they are come from another process, at two sizes, with the
-defaults of Fast DDS and with `config/fastdds_shm.xml`. Except for the last figure, the node keeps
-the latest image.
+Images under stripes that stay as they are, each with noise of its own, come from another process,
+at two sizes, with the defaults of Fast DDS and with `config/fastdds_shm.xml`. One node searches
+every image, another one follows targets. Except for the last figure, a node keeps the latest
+image.
 
+- First: the time to the answer to the first image.
 - Latency: from the stamp of an image, given when it is sent, to its answer, with one image sent at
   a time; beside it the time of the identification itself.
 - Rate: the highest of a series of falling rates at which every image of a stream is answered.
@@ -21,10 +23,11 @@ import os
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from statistics import median, quantiles
 
+import numpy as np
 import rclpy
 from sensor_msgs.msg import Image
 from std_msgs.msg import Header
@@ -44,6 +47,12 @@ TRANSPORTS = {'defaults': {}, PROFILE.name: dict.fromkeys(VARIABLES, str(PROFILE
 SIZES = {'2.5 MP': (1936, 1296, 10.0), '10.6 MP': (3984, 2656, 20.0)}
 """Width and height of the images, and the radius of the dots of 54 targets, px."""
 
+NOISE, IMAGES = 1.5, 8
+"""Deviation of the noise of an image, and the number of images with noise of their own."""
+
+NODES = {'searched': ('-p', 'follow:=0'), 'followed': ()}
+"""Arguments of the nodes, by the names of their rows."""
+
 STEP = 0.93
 """Ratio of two rates of the series."""
 
@@ -62,28 +71,27 @@ class Stream:
     Parameters
     ----------
     graph : live.Graph
-    message : Image
-        Sent again and again.
+    messages : list of Image
+        Sent in turn, again and again.
     namespace : str
         Of the node.
     folder : Path or None
         Checkout whose node it is.
-    queue : str
-        Of the node.
+    given : sequence of str
+        Its arguments.
     """
 
     def __init__(
         self,
         graph: live.Graph,
-        message: Image,
+        messages: list[Image],
         namespace: str,
         folder: Path | None,
-        queue: str = LATEST,
+        given: Sequence[str],
     ) -> None:
         self._graph = graph
-        self._message = message
+        self._messages = messages
         places = '-r', f'__ns:={namespace}', '-r', f'/diagnostics:={namespace}/diagnostics'
-        given = '-p', f'queue:={queue}'
         graph.start('detector', *places, *given, folder=folder)
         self._publisher = graph.node.create_publisher(Image, f'{namespace}/image', 100)
         self.sent: dict[int, float] = {}
@@ -100,9 +108,10 @@ class Stream:
     def send(self) -> int:
         """Send the image and return its number."""
         number = len(self.sent) + 1
-        self._message.header.stamp.sec = number
+        message = self._messages[number % len(self._messages)]
+        message.header.stamp.sec = number
         self.sent[number] = time.monotonic()
-        self._publisher.publish(self._message)
+        self._publisher.publish(message)
         return number
 
     def wait(self, until: Callable[[], bool], limit: float) -> bool:
@@ -144,6 +153,14 @@ class Stream:
         return True
 
 
+def noisy(image: np.ndarray) -> Iterator[np.ndarray]:
+    """Yield images that differ from one in their noise."""
+    generator = np.random.default_rng(1)
+    for _ in range(IMAGES):
+        noise = generator.normal(0.0, NOISE, image.shape)
+        yield np.clip(np.rint(image + noise), 0, 255).astype(np.uint8)
+
+
 def all_at_once(stream: Stream, images: int) -> float:
     """Return how many images a second a lossless queue answers, Hz."""
     stream.answer()
@@ -165,6 +182,7 @@ def latencies(streams: dict[str, Stream], images: int) -> dict[str, Figures]:
     for name, rows in times.items():
         totals, own = zip(*rows[2:], strict=True)
         figures[name] = {
+            'first (ms)': 1e3 * rows[0][0],
             'p50 (ms)': 1e3 * median(totals),
             'p99 (ms)': 1e3 * quantiles(totals, n=100, method='inclusive')[98],
             'identification (ms)': 1e3 * median(own),
@@ -185,19 +203,27 @@ def rate_without_loss(stream: Stream, images: int, latency: Figures) -> float:
 
 def measured(options: argparse.Namespace) -> dict[str, Figures]:
     """Return the figures with the transport that the environment says, by size and checkout."""
-    rows = {}
-    folders = {'before': options.before, 'now': None} if options.before else {'now': None}
+    rows: dict[str, Figures] = {}
+    nodes = {name: (None, given) for name, given in NODES.items()}
+    if options.before:
+        nodes = {'before': (options.before, ()), **nodes}
     for size in options.sizes:
         width, height, radius = SIZES[size]
         scene = SceneSettings(
             width=width, height=height, dot_radius=radius, light=options.light, ambient=0.3
         )
-        message = image_message(render(scene).image, Header())
+        messages = [image_message(it, Header()) for it in noisy(render(scene).image)]
         with live.opened() as graph:
             latest, lossless = (
                 {
-                    name: Stream(graph, message, f'/{name}_{queue}', folder, queue)
-                    for name, folder in folders.items()
+                    name: Stream(
+                        graph,
+                        messages,
+                        f'/{name}_{queue}',
+                        folder,
+                        ('-p', f'queue:={queue}', *given),
+                    )
+                    for name, (folder, given) in nodes.items()
                 }
                 for queue in (LATEST, LOSSLESS)
             )
