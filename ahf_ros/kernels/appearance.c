@@ -82,9 +82,12 @@ void unlike_shares(count k, count i, count c, count m, count n, const float gray
             bool is[KINDS], *before = odd[j % 2], *here = odd[1 - j % 2];
             for (int kind = 0; kind < KINDS; kind++)
                 is[kind] = clear[j] && radii[j] > kinds[b][kind][0] && radii[j] < kinds[b][kind][1];
-            bool any = is[BEYOND] || is[GAP] || is[NEAR];
-            if (any)
-                steps_on(m, image[j], light[b], scale, radii[j], directions, offset, steps[j]);
+            if (!is[BEYOND] && !is[GAP] && !is[NEAR]) {
+                for (count a = 0; a < m; a++)
+                    here[a] = false;
+                continue;
+            }
+            steps_on(m, image[j], light[b], scale, radii[j], directions, offset, steps[j]);
             for (count a = 0; a < m; a++) {
                 count angle = phase + a < m ? phase + a : phase + a - m;
                 bool seen = radii[j] <= reach[b][angle], ink = seen && inked[a] && is[DEEP];
@@ -94,7 +97,7 @@ void unlike_shares(count k, count i, count c, count m, count n, const float gray
                 missing[a] += faded;
                 here[a] = faded || (paper && steps[j][angle] > even);
             }
-            for (count s = 0; s < n && any; s++) {
+            for (count s = 0; s < n; s++) {
                 count differ = 0, all = 0;
                 for (count a = s * p; a < (s + 1) * p && a < m; a++) {
                     all += known[a];
