@@ -137,7 +137,7 @@ def candidates(image: np.ndarray, detector: Any, recipe: Recipe) -> tuple[float,
 
 def stream(image: np.ndarray, detector: Any, expected: int) -> tuple[float, float]:
     """Return the median time of an image of a stream, and of its filter and identification, s."""
-    identifier = create_identifier(detector=detector, expected_targets=expected)
+    identifier = create_identifier(detector=detector, expected_targets=expected, follow=0)
     state = identifier.identify(image).filter
     values = state.gamma_high, state.gamma_low, state.cutoff, state.attenuation
 

@@ -129,6 +129,10 @@ _RING = {'light': 'stripe', 'ambient': 0.3}
 IMAGES: dict[str, tuple[dict[str, Any], Image]] = {
     'ring': ({'family': 'metashape12'}, partial(scene, 'metashape12', 12.0)),
     'ring, stripes': ({'family': 'metashape12'}, partial(scene, 'metashape12', 12.0, **_RING)),
+    'ring, followed': (
+        {'family': 'metashape12', 'follow': 30},
+        partial(scene, 'metashape12', 12.0),
+    ),
     'traditional': (
         {'family': 'metashape12', 'detector': 'traditional'},
         partial(scene, 'metashape12', 12.0),
@@ -155,8 +159,8 @@ def calls_for(name: str) -> tuple[int, int]:
     """Return the calls that the identification of an image takes, and its targets."""
     options, image = IMAGES[name]
     shown = image()
-    identifier = create_identifier(**options, threads=1)
-    identifier.identify(shown)  # modules are imported, tables made
+    identifier = create_identifier(**{'follow': 0, 'threads': 1, **options})
+    identifier.identify(shown ^ 1)  # modules are imported, tables made; the noise is another one
     found: list[Any] = []
     calls = calls_of(lambda: found.append(identifier.identify(shown)))
     return calls, len(found[0].targets)
