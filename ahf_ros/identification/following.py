@@ -4,8 +4,8 @@ Known targets are looked for near the places where the last image showed them, a
 by all evidence. How they moved tells how the image did. Where it shows something else than the
 last one, moved alike, it is searched as any image is; so are the places of targets that could not
 be read again, and, image by image, one part after the other of what seems not to have changed.
-Where less than half of the targets are confirmed, or something contradicts them, the image is
-searched wholly, as the first one was.
+Where less than half of the targets are confirmed, the image is searched wholly, as the first one
+was.
 """
 
 from __future__ import annotations
@@ -18,12 +18,7 @@ from itertools import combinations
 import cv2
 import numpy as np
 
-from ahf_ros.base.target import (
-    UNDECODED,
-    Prints,
-    Target,
-    reach_of,
-)
+from ahf_ros.base.target import UNDECODED, Prints, Target, reach_of
 from ahf_ros.families.contract import Confirmed, Part
 from ahf_ros.identification.filtering.identifier import Seen
 from ahf_ros.identification.filtering.trials import DetectorFunction
@@ -35,6 +30,7 @@ _SEMI_AXIS = 5.0  # px; larger targets are looked for again in a smaller image
 _LEAST = 0.5  # share of the known targets that are confirmed
 _STILL = 0.3  # px; images that moved by less are compared as they are
 _TELLING = 8  # targets that tell an affine movement, not only how far
+_ACROSS = 0.05  # ratio of the width of where they are to its length, at the least
 _NEAR, _PIXELS = 0.5, 2.0  # semi-axes, or px, between two places of one target
 _TILE = 32  # side of what has changed or has not, px of the half
 _CHANGED = 6  # pixels of a tile that show another image
@@ -44,7 +40,7 @@ _MARGIN = 1.15  # times the reach of a target, within which its edges are
 _AT_LEAST = 32  # px about what has changed
 _SIDE = 480  # px, usual side of a part that is searched though it seems not to have changed
 _EACH = 100_000  # px, to which the search of a part amounts whatever its size is
-_MOST = 0.3  # share of an image that is searched in parts
+_MOST, _FEW = 0.3, 50  # share of an image that is searched in parts, and their number
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,12 +101,14 @@ class Following:
             parts.append(_grown(turn, math.ceil(max(reach, _AT_LEAST)), image.shape))
         changed = _changed(image, before.image, movement, reach)
         parts += self._changes(changed, followed, math.ceil(max(2 * reach, _AT_LEAST)))
-        parts = _joined(parts)
-        if sum(map(_area, parts)) > _MOST * image.size:
+        parts = _joined(parts) if len(parts) <= _FEW else parts
+        if sum(map(_area, parts)) > _MOST * image.size or len(parts) > _FEW:
             parts = [(0, 0, width, height)]
-        found = again.search(parts)
+        found = again.search(parts) if parts else again.targets
+        where = {it.print: it for it in followed}
         targets = tuple(
-            replace(it, followed=any(_is_same(it, of) for of in followed)) for it in found
+            replace(it, followed=it.print in where and _is_same(it, where[it.print]))
+            for it in found
         )
         # What is lost is looked for in each image, until all of its part has been searched.
         prints = {it.print for it in targets}
@@ -225,10 +223,13 @@ def _movement(old: Sequence[Target], new: Sequence[Target]) -> np.ndarray:
     if not old:
         return np.eye(2, 3)
     start, end = (np.array([(it.x, it.y) for it in of]) for of in (old, new))
-    if len(old) < _TELLING:
-        return np.column_stack([np.eye(2), np.median(end - start, axis=0)])
-    places = np.column_stack([start, np.ones(len(old))])
-    return np.linalg.lstsq(places, end, rcond=None)[0].T
+    moved = end - start
+    shift, about = np.median(moved, axis=0), start.mean(axis=0)
+    linear = np.zeros((2, 2))
+    if len(old) >= _TELLING:  # along a line that all are on, nothing is told across it
+        linear = np.linalg.lstsq(start - about, moved - moved.mean(axis=0), rcond=_ACROSS)[0].T
+        shift = moved.mean(axis=0)
+    return np.column_stack([np.eye(2) + linear, shift - linear @ about])
 
 
 def _to(movement: np.ndarray, target: Target) -> np.ndarray:
@@ -292,15 +293,15 @@ def _noise(image: np.ndarray) -> float:
 
 
 def _part(shape: tuple[int, int], turn: int, interval: int) -> Part | None:
-    """Return the part of an image whose turn it is, None if it is none's.
+    """Return the part of an image whose turn it is, None if this image is to have none.
 
     The turns of as many parts as are worth it are spread over the images of an interval.
     """
     height, width = shape
     columns = max(1, min(round(math.sqrt(interval * width / height)), round(width / _SIDE)))
     rows = max(1, min(interval // columns, round(height / _SIDE)))
-    number, left = divmod(turn % interval * rows * columns, interval)
-    if left >= rows * columns:
+    number, since = divmod(turn % interval * rows * columns, interval)
+    if since >= rows * columns:
         return None
     row, column = divmod(number, columns)
     left, right = (width * it // columns for it in (column, column + 1))
@@ -324,9 +325,9 @@ def _grown(part: Part, margin: int, shape: tuple[int, int]) -> Part:
     )
 
 
-def _joined(partes: Iterable[Part]) -> list[Part]:
+def _joined(parts: Iterable[Part]) -> list[Part]:
     """Return parts of an image, two as one where this is no more work."""
-    joined = list(partes)
+    joined = list(parts)
     while True:
         for first, second in combinations(range(len(joined)), 2):
             one, other = joined[first], joined[second]

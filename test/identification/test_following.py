@@ -37,7 +37,7 @@ def check_alike(found: Identification, fresh: Identification) -> None:
     assert [it.print for it in found] == [it.print for it in fresh]
     away = np.linalg.norm(found.centres - fresh.centres, axis=1)
     sigma = np.sqrt(np.trace(fresh.covariances, axis1=1, axis2=2) / 2)
-    assert (away < sigma).all()
+    assert (away < 2 * sigma).all()
 
 
 def followed(found: Iterable[Target]) -> set[int]:
