@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from ahf_ros.families.square.frames import SQUARE, square_frames
-from ahf_ros.families.square.shapes import corner_odds, parallel_odds
+from ahf_ros.families.square.shapes import parallel_odds
 
 
 def trapezoid(side: float, upper: float) -> np.ndarray:
@@ -31,13 +31,3 @@ def test_small_squares_have_parallel_sides(
 def test_a_sheared_square_is_one_that_is_tilted() -> None:
     sheared = 30 * SQUARE @ np.array([[1, 0.2], [0.3, 0.6]])
     assert parallel_odds(square_frames(sheared[None]), 1000) == pytest.approx(0, abs=1e-6)
-
-
-def test_sharp_corners_tell_more_than_blurred_ones() -> None:
-    dark, bright = np.zeros((1, 4)), np.ones((1, 4))
-    sharp, blurred = np.full((1, 2), 3.0), np.full((1, 2), 0.3)
-    assert corner_odds(dark, sharp, 12.0) == pytest.approx(6.0, abs=0.1)
-    assert corner_odds(bright, sharp, 12.0) == pytest.approx(-6.0, abs=0.1)
-    assert np.abs(corner_odds(bright, blurred, 12.0)).max() < 1.5
-    # Blur alone makes a corner as bright as this; it tells for a square.
-    assert (corner_odds(np.full((1, 4), 0.62), blurred, 12.0) > 0).all()
