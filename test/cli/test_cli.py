@@ -24,7 +24,7 @@ KEYS = (
     'image width height upright family looked_for detector expected estimated expected_ids '
     'mirrored edge_shift codes reach targets repeated unsettled filter search elapsed_s',
     'id code x y semi_major semi_minor angle confidence covariance family '
-    'edge_shift polarity bits',
+    'edge_shift polarity followed bits',
     'applied gamma_high gamma_low cutoff attenuation evaluations generations log_offset '
     'black_percentile white_percentile',
 )
