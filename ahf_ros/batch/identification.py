@@ -72,7 +72,7 @@ def identify_images(task: ImageTask, report: Report = no_report) -> ImageOutcome
     overlays = dict(zip(task.paths, task.overlays, strict=False))
     with _reported(', '.join(images), messages):
         identifier = create_identifier(
-            detector=detector, settings=task.settings, interrupt=ending.check
+            detector=detector, settings=task.settings, interrupt=ending.check, follow=0
         )
         identifier.memory = memory_of(task.families)
         for part, stack, found in identify_parts(identifier, list(images.values()), task.stacking):

@@ -10,7 +10,9 @@ import numpy as np
 from ahf_ros.base.target import DottedTarget, Prints, Target, reach_of
 from ahf_ros.vision.frame import affine_frames
 
-_MARGIN = 1.15  # times the reach of a target, within which the blur of its edges is
+MARGIN = 1.15
+"""Times the reach of a target, within which the blur of its edges is."""
+
 _ANGLES = 64  # in which the surroundings of a target are looked at
 
 
@@ -74,5 +76,5 @@ def _reach(target: Target, prints: Prints) -> tuple[float, float, float]:
     times = reach_of(target, prints)
     if isinstance(target, DottedTarget) and target.dots:
         away = max(hypot(x - target.x, y - target.y) + size for x, y, size, *_ in target.dots)
-        return _MARGIN * away, _MARGIN * away, 0.0
-    return _MARGIN * times * target.semi_major, _MARGIN * times * target.semi_minor, target.angle
+        return MARGIN * away, MARGIN * away, 0.0
+    return MARGIN * times * target.semi_major, MARGIN * times * target.semi_minor, target.angle

@@ -20,8 +20,10 @@ import numpy as np
 
 from ahf_ros.base.target import UNDECODED, Prints, Target, reach_of
 from ahf_ros.families.contract import Confirmed, Part
+from ahf_ros.families.explained import MARGIN
 from ahf_ros.identification.filtering.identifier import Seen
 from ahf_ros.identification.filtering.trials import DetectorFunction
+from ahf_ros.vision.noise import usual_noise
 
 _AROUND = 1.6  # half the side of what is looked for again, in semi-axes of a target's ellipse
 _FARTHEST = 1.5  # by which a target may have moved, in its semi-axes
@@ -36,7 +38,6 @@ _TILE = 32  # side of what has changed or has not, px of the half
 _CHANGED = 6  # pixels of a tile that show another image
 _NOISE = 4.0  # deviations of noise beyond the gray values next to a pixel
 _STEP = 3  # gray values, beside noise
-_MARGIN = 1.15  # times the reach of a target, within which its edges are
 _AT_LEAST = 32  # px about what has changed
 _SIDE = 480  # px, usual side of a part that is searched though it seems not to have changed
 _EACH = 100_000  # px, to which the search of a part amounts whatever its size is
@@ -117,7 +118,7 @@ class Following:
 
     def _reach(self, target: Target) -> float:
         """Return the radius of a target with the blur of its edges, px."""
-        return _MARGIN * reach_of(target, self.prints) * target.semi_major
+        return MARGIN * reach_of(target, self.prints) * target.semi_major
 
     def _places(self, lost: Iterable[Target], shape: tuple[int, int]) -> Iterator[Part]:
         """Yield the parts of an image in which targets are looked for that are lost."""
@@ -280,16 +281,8 @@ def _changed(
     for strip in (of for it_enters, of in enters if it_enters):
         shown = now[strip]
         difference[strip] = cv2.subtract(cv2.dilate(shown, beside), cv2.erode(shown, beside))
-    limit = _NOISE * _noise(now) + _STEP
+    limit = _NOISE * usual_noise(now) + _STEP
     return cv2.threshold(difference, limit, 1, cv2.THRESH_BINARY)[1]
-
-
-def _noise(image: np.ndarray) -> float:
-    """Return the usual deviation of noise in an image; see `ahf_ros.vision.noise`."""
-    some = image[: len(image) // 8 * 8].reshape(-1, 8, image.shape[1])[:, :3].astype(np.int16)
-    across = some[:, :, 2:] - 2 * some[:, :, 1:-1] + some[:, :, :-2]
-    mask = np.abs(across[:, 0] - 2 * across[:, 1] + across[:, 2])
-    return 1.4826 * float(np.median(mask)) / 6
 
 
 def _part(shape: tuple[int, int], turn: int, interval: int) -> Part | None:

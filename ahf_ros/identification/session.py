@@ -200,6 +200,7 @@ def identify(
     >>> [target.id for target in found] == [target.id for target in scene.targets]
     True
     """
+    options.setdefault('follow', 0)  # no image comes next
     return create_identifier(detector=detector, settings=settings, **options).identify(image)
 
 

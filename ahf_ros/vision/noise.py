@@ -19,6 +19,7 @@ from ahf_ros.vision.robust import NORMAL
 
 _PLACES = 12  # along either side of the square about a target
 _DIFFERENCE = 6.0  # root of the sum of the squares of its factors
+_APART = 8  # rows, of which three tell the noise of an image
 _INTERPOLATED = 2 / 3  # mean share of the noise of pixels that bilinear values have
 
 
@@ -31,3 +32,15 @@ def reading_noise(gray: np.ndarray, frames: np.ndarray, radius: float) -> np.nda
     points = np.stack(np.meshgrid(along, along)).reshape(2, -1)
     sizes, _ = kernels.second_differences(gray, frames, points)
     return np.asarray(sizes * (NORMAL * _INTERPOLATED / _DIFFERENCE))
+
+
+def usual_noise(image: np.ndarray) -> float:
+    """Return the usual standard deviation of the noise of an image of uint8, by some of its rows.
+
+    It has at least 8 rows and 3 columns.
+    """
+    height, width = image.shape
+    rows = image[: height // _APART * _APART].reshape(-1, _APART, width)[:, :3].astype(np.int16)
+    across = rows[..., 2:] - 2 * rows[..., 1:-1] + rows[..., :-2]
+    sizes = np.abs(across[:, 0] - 2 * across[:, 1] + across[:, 2])
+    return NORMAL * float(np.median(sizes)) / _DIFFERENCE

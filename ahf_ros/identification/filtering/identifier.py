@@ -355,9 +355,11 @@ class Identifier:
 
     def _look_again(self, trials: Trials) -> Seen | None:
         """Note what an image shows as received if the one before it tells where to look."""
-        before, image = self.memory.seen, trials.image(trials.plain[0])
-        alone = trials.plain == (None,) and image.dtype == np.uint8
+        before, alone = self.memory.seen, trials.plain == (None,)
         if not (self._follow and before and alone) or trials.found or self.memory.filter:
+            return None
+        image = trials.image(None)
+        if image.dtype != np.uint8:
             return None
         self._interrupt()
         seen = self._follow(image, before)
@@ -366,8 +368,10 @@ class Identifier:
 
     def _seen_in(self, trials: Trials) -> Seen | None:
         """Return what was seen in an image as received, if the next one may show it again."""
-        image = trials.image(trials.plain[0])
-        if not self._follow or None not in trials.found or image.dtype != np.uint8:
+        if not self._follow or None not in trials.found:
+            return None
+        image = trials.image(None)
+        if image.dtype != np.uint8:
             return None
         # The caller may take the next image into the same array.
         return Seen(image.copy(), tuple(trials.found[None]))
