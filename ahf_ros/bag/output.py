@@ -167,6 +167,7 @@ def _stored(seen: Seen) -> tuple[int, bytes, str, int]:
         'targets': [asdict(it) for it in seen.targets],
         'lost': [asdict(it) for it in seen.lost],
         'turn': seen.turn,
+        'still': seen.still,
     }
     image, text = seen.image.tobytes(), json.dumps(known)
     return len(seen.image), image, text, crc32(text.encode(), crc32(image))
@@ -181,7 +182,7 @@ def _restored(height: int, image: bytes, text: str, checksum: int) -> Seen:
         tuple(targets_from_json({'targets': known[name]}, name)) for name in ('targets', 'lost')
     )
     pixels = np.frombuffer(image, np.uint8).reshape(height, -1)
-    return Seen(pixels, targets, lost, known['turn'])
+    return Seen(pixels, targets, lost, known['turn'], known['still'])
 
 
 def begin(output: Path, origin: str) -> None:

@@ -64,7 +64,7 @@ Report = Callable[[int, int, str], None]
 """Called after each image with the number of finished images, the number of all images or 0 if
 unknown, and what there is to say about this image or its stack, empty if there is nothing."""
 
-_FORMAT = 7  # version of the journal and of the data stored in a bag
+_FORMAT = 8  # version of the journal and of the data stored in a bag
 _TOPIC_NAME = re.compile(r'/?[A-Za-z_]\w*(/[A-Za-z_]\w*)*', re.ASCII)
 _ADDRESS = re.compile('[?#%]')  # rosbags opens SQLite files by an address
 

@@ -16,7 +16,13 @@ MARGIN = 1.15
 _ANGLES = 64  # in which the surroundings of a target are looked at
 
 
-def without_targets(image: np.ndarray, targets: Iterable[Target], prints: Prints) -> np.ndarray:
+Part = tuple[slice, slice]
+"""Rows and columns of a part of an image, each with its start and its end."""
+
+
+def without_targets(
+    image: np.ndarray, targets: Iterable[Target], prints: Prints, part: Part | None = None
+) -> np.ndarray:
     """Return an image in which targets are painted over with the light about them.
 
     Parameters
@@ -25,13 +31,15 @@ def without_targets(image: np.ndarray, targets: Iterable[Target], prints: Prints
     targets : iterable of Target
     prints : mapping of str to FamilyRecord
         Their families by name; a target of another one ends with its ellipse.
+    part : tuple of 2 slice, optional
+        Part of the image that is returned.
 
     Returns
     -------
     ndarray
-        Of the same shape and type. From the edge of what is painted over to its centre, gray
-        values pass smoothly from those of the surroundings to their median, so that there is no
-        edge.
+        Of the same shape and type, or that part of it. From the edge of what is painted over to
+        its centre, gray values pass smoothly from those of the surroundings to their median, so
+        that there is no edge.
 
     Examples
     --------
@@ -42,8 +50,9 @@ def without_targets(image: np.ndarray, targets: Iterable[Target], prints: Prints
     >>> len(found), len(identify(left, family='metashape12'))
     (3, 0)
     """
-    left = image.copy()
     height, width = image.shape
+    rows, columns = part or (slice(0, height), slice(0, width))
+    left = image[rows, columns].copy()
     angles = np.arange(_ANGLES) * 2 * np.pi / _ANGLES
     ellipses = np.array([(it.x, it.y, *_reach(it, prints)) for it in targets]).reshape(-1, 5)
     frames = affine_frames(*ellipses.T)
@@ -51,14 +60,13 @@ def without_targets(image: np.ndarray, targets: Iterable[Target], prints: Prints
     rims = np.rint((frames @ circle)[:, :2]).astype(int)
     x, y = rims.swapaxes(0, 1)
     every = image[y.clip(0, height - 1), x.clip(0, width - 1)].astype(float)
-    low, high = (it.clip(0).tolist() for it in (rims.min(axis=2), rims.max(axis=2) + 1))
-    columns = zip(low, high, every, np.median(every, axis=1), np.linalg.inv(frames), strict=True)
-    for (first, top), (end, bottom), about, middle, inverse in columns:
-        part = left[top:bottom, first:end]
-        if not part.size:
+    start, stop = (columns.start, rows.start), (columns.stop, rows.stop)
+    low, high = (it.clip(start, stop).tolist() for it in (rims.min(axis=2), rims.max(axis=2) + 1))
+    of_targets = low, high, every, np.median(every, axis=1), np.linalg.inv(frames)
+    for (first, top), (end, bottom), about, middle, inverse in zip(*of_targets, strict=True):
+        if first == end or top == bottom:
             continue
-        right = np.arange(first, first + part.shape[1])
-        down = np.arange(top, top + len(part))[:, None]
+        right, down = np.arange(first, end), np.arange(top, bottom)[:, None]
         across, along = (
             inverse[row, 0] * right + inverse[row, 1] * down + inverse[row, 2] for row in (0, 1)
         )
@@ -67,7 +75,9 @@ def without_targets(image: np.ndarray, targets: Iterable[Target], prints: Prints
         turn = np.arctan2(along, across)[inside] % (2 * np.pi)
         rim_values = np.interp(turn, angles, about, period=2 * np.pi)
         painted = middle + outwards[inside] * (rim_values - middle)
-        part[inside] = painted.astype(image.dtype) if image.dtype.kind == 'f' else np.rint(painted)
+        painted = painted if image.dtype.kind == 'f' else np.rint(painted)
+        of_target = left[top - start[1] : bottom - start[1], first - start[0] : end - start[0]]
+        of_target[inside] = painted
     return left
 
 

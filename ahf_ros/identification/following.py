@@ -75,7 +75,7 @@ class Following:
             In the image before.
         """
         if np.array_equal(before.image, image):
-            return before
+            return replace(before, still=before.still + 1)
         after = self._followed(image, before) if before.image.shape == image.shape else None
         # The caller may take the next image into the same array.
         return after or Seen(image.copy(), tuple(self.detector(image)))
@@ -101,7 +101,8 @@ class Following:
         if turn:
             parts.append(_grown(turn, math.ceil(max(reach, _AT_LEAST)), image.shape))
         changed = _changed(image, before.image, movement, reach)
-        parts += self._changes(changed, followed, math.ceil(max(2 * reach, _AT_LEAST)))
+        changes = [*self._changes(changed, followed, math.ceil(max(2 * reach, _AT_LEAST)))]
+        parts += changes
         parts = _joined(parts) if len(parts) <= _FEW else parts
         if sum(map(_area, parts)) > _MOST * image.size or len(parts) > _FEW:
             parts = [(0, 0, width, height)]
@@ -114,7 +115,8 @@ class Following:
         # What is lost is looked for in each image, until all of its part has been searched.
         prints = {it.print for it in targets}
         lost = [it for it in lost if it.print not in prints and not (turn and _holds(turn, it))]
-        return Seen(image.copy(), targets, tuple(lost), before.turn + 1)
+        still = 0 if changes else before.still + 1
+        return Seen(image.copy(), targets, tuple(lost), before.turn + 1, still)
 
     def _reach(self, target: Target) -> float:
         """Return the radius of a target with the blur of its edges, px."""

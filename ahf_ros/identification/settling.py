@@ -4,7 +4,8 @@ All families are looked for in the first images, as received, until it is clear 
 mostly in one. From then on only those that were found are looked for, and all again in an image
 that does not clearly show one of these. Each image that does has a part of it looked at for all
 others, where its targets are painted over; what is there shows itself within some images, and
-none of them takes much longer.
+none of them takes much longer. Where nothing has changed since all parts were looked at, as
+following the targets shows, such looks become rare.
 """
 
 import math
@@ -23,7 +24,7 @@ from ahf_ros.base.notices import said_once
 from ahf_ros.base.target import UNDECODED, Identification, Target, UndecodedTarget
 from ahf_ros.base.target_check import checked_targets
 from ahf_ros.families.evidence import Reading, evidence, is_clear, reading_of
-from ahf_ros.families.explained import without_targets
+from ahf_ros.families.explained import Part, without_targets
 from ahf_ros.families.undecoded import undecoded
 from ahf_ros.identification.filtering.genetic import Values
 from ahf_ros.identification.filtering.identifier import Identifier, Memory
@@ -40,6 +41,7 @@ _PER_IMAGE = 0.3  # words that texture shows by chance in an image, at the most
 _OF_KNOWN = 1.99  # ... on families that other images have settled: one certain to 0.99
 
 _IN_TURN = 8  # images, at least, over which the looks at all parts of one are spread
+_STILL = 30  # times as many, where nothing has changed since all these looks
 _WHOLE_KINDS = ('ring',), ('aruco', 'apriltag')  # of which a part may show too few
 _READ_BY_NAME = {'aruco', 'apriltag'}  # also where all families have been looked for
 _PART = 480  # side of a part of an image in which other families are looked for, px, at least
@@ -110,17 +112,16 @@ def _family(target: Target) -> str:
     return target.likely_family if isinstance(target, UndecodedTarget) else target.family
 
 
-def _parts(image: np.ndarray) -> list[Callable[[], np.ndarray]]:
-    """Return what makes parts of an image that overlap, and the whole in their size."""
-    height, width = image.shape
-    rows, columns = _spans(height), _spans(width)
-    parts = [partial(image.__getitem__, (row, column)) for row in rows for column in columns]
-    if len(parts) == 1:
-        return [lambda: image]
-    size = columns[0].stop, rows[0].stop
-    scale = min(size[0] / width, size[1] / height)
-    whole = partial(cv2.resize, image, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
-    return [*parts, whole]
+def _parts(shape: tuple[int, int]) -> list[Part]:
+    """Return parts of an image, which overlap."""
+    rows, columns = map(_spans, shape)
+    return [(row, column) for row in rows for column in columns]
+
+
+def _reduced(image: np.ndarray, part: Part) -> np.ndarray:
+    """Return an image in the size of one of its parts."""
+    scale = min(of.stop / side for of, side in zip(part, image.shape, strict=True))
+    return cv2.resize(image, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
 
 
 def _spans(side: int) -> list[slice]:
@@ -230,25 +231,38 @@ class SettlingIdentifier(Identifier):
         """Return what an image shows beside its targets, if a look at a part shows something.
 
         Each image gets another look, those of a batch one at the whole; where there are few looks,
-        as at small images, some images get none.
+        as at small images, some images get none, and where nothing has changed, most.
         """
-        turn = self.memory.glanced
+        turn, still = self.memory.glanced, self.memory.seen.still if self.memory.seen else 0
         self.memory = replace(self.memory, glanced=turn + 1)
         image = stack.combined(found.combination or stack.names[0])
         known = [it for it in found.targets if it.id != UNDECODED]
-        left = without_targets(image, known, found.prints)
-        parts = _parts(left) if turn >= 0 else [lambda: left]
-        looks = [lambda it=it: self._seen(it()) for it in parts]
+        left = partial(without_targets, image, known, found.prints)
+        parts = _parts(stack.shape) if turn >= 0 else []
+
+        def in_part(part: Part | None = None) -> list[Target]:
+            return self._seen(left(part))
+
+        def of_kinds(kinds: Collection[str]) -> list[Target]:
+            return self._of_kinds(kinds, left())
+
+        def reduced() -> list[Target]:
+            return self._seen(_reduced(left(), parts[0]))
+
+        looks: list[Callable[[], list[Target]]] = [in_part]
         if len(parts) > 1:  # where few may not tell which of several families it is
-            looks += [partial(self._of_kinds, kinds, left) for kinds in _WHOLE_KINDS]
+            looks = [partial(in_part, it) for it in parts]
+            looks += [reduced, *(partial(of_kinds, it) for it in _WHOLE_KINDS)]
         every = math.ceil(_IN_TURN / len(looks)) if turn > 0 else 1
+        if still >= every * len(looks):
+            every *= _STILL
         if turn % every:
             return []
         seen = looks[turn // every % len(looks)]()
         if len(looks) > 1:
             odds = evidence(map(reading_of, seen))
             kinds = {self._kinds[name] for name, of in odds.items() if sum(of) > _WORTH_A_LOOK}
-            seen = self._of_kinds(kinds, left) if kinds else []
+            seen = of_kinds(kinds) if kinds else []
         return [it for it in seen if reading_of(it)[0] not in (*self.memory.families, '')]
 
     def _seen(self, image: np.ndarray) -> list[Target]:

@@ -162,6 +162,30 @@ def test_a_family_that_appears_in_a_stream_is_found(first: str, second: str, lig
     assert set(found.looked_for.split(',')) == {first, second}
 
 
+@pytest.mark.lasting
+def test_what_stands_still_is_rarely_looked_at_again_until_it_changes() -> None:
+    half = replace(WALL, width=450, height=450, targets=4, full_well=0.0)
+    alone = np.hstack([render(replace(half, targets=number)).image for number in (4, 0)])
+    other = render(replace(half, family='gsi', dot_radius=5, seed=5))
+    both = np.hstack([alone[:, :450], other.image])
+    noise = np.random.default_rng(1).normal(0.0, 1.5, (30, *alone.shape))
+    identifier = create_identifier(threads=1)
+    named = create_identifier(family='metashape12', threads=1)
+
+    def calls(image: np.ndarray) -> float:
+        of_named = calls_of(lambda: named.identify(image))
+        return calls_of(lambda: identifier.identify(image)) / of_named
+
+    still = [calls(np.clip(np.rint(alone + it), 0, 255).astype(np.uint8)) for it in noise]
+    assert sum(of > 1.5 for of in still) > 5
+    assert max(still[-12:]) < 1.2
+    assert identifier.memory.families == ('metashape12',)
+    since = identifier.memory.glanced
+    while 'gsi' not in identifier.memory.families and identifier.memory.glanced < since + 15:
+        identifier.identify(both)
+    assert identifier.memory.families == ('metashape12', 'gsi')
+
+
 def test_small_images_are_looked_at_now_and_then() -> None:
     image = render(replace(WALL, width=400, height=300, targets=3)).image
     identifier = create_identifier(threads=1, follow=0)
@@ -200,5 +224,7 @@ def test_nothing_is_left_of_targets_that_are_painted_over(family: str, light: st
     left = without_targets(scene.image, scene.targets, prints)
     assert create_detector()(left) == []
     assert not np.array_equal(left, scene.image)
+    part = slice(90, 400), slice(150, 560)
+    assert np.array_equal(without_targets(scene.image, scene.targets, prints, part), left[part])
     again = without_targets(scene.image.astype(np.float32), scene.targets, prints)
     assert np.abs(again - left).max() <= 0.5

@@ -70,12 +70,15 @@ class Seen:
         Earlier ones that this image does not show, where they would be.
     turn : int
         How many images came before it.
+    still : int
+        How many images in a row, up to this one, have shown nothing new beside their targets.
     """
 
     image: np.ndarray
     targets: tuple[Target, ...]
     lost: tuple[Target, ...] = ()
     turn: int = 0
+    still: int = 0
 
 
 Follow = Callable[[np.ndarray, Seen], Seen]
