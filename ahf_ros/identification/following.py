@@ -38,6 +38,8 @@ _TILE = 32  # side of what has changed or has not, px of the half
 _CHANGED = 6  # pixels of a tile that show another image
 _NOISE = 4.0  # deviations of noise beyond the gray values next to a pixel
 _STEP = 3  # gray values, beside noise
+_EVERY = 4  # pixels of the half, one of which tells how light has changed
+_DARK = 16  # gray value below which steps of gray values are too coarse to tell it
 _AT_LEAST = 32  # px about what has changed
 _SIDE = 480  # px, usual side of a part that is searched though it seems not to have changed
 _EACH = 100_000  # px, to which the search of a part amounts whatever its size is
@@ -260,16 +262,20 @@ def _changed(
 ) -> np.ndarray:
     """Return where the half of an image is not what it was, or lies next to it; uint8, 1 or 0.
 
-    What is there as far from a side that moves into the image as targets reach is new, too.
+    Light may be brighter or darker as a whole, as that of lamps in the beat of the mains, or to
+    another exposure. What is there as far from a side that moves into the image as targets reach
+    is new, too.
     """
     height, width = image.shape
     now, then = (
         cv2.resize(it, (width // 2, height // 2), interpolation=cv2.INTER_AREA)
         for it in (image, _moved(before, movement))
     )
+    least = np.rint(np.arange(256) * _gain(now, then)).clip(0, 255).astype(np.uint8)
+    most = np.append(least[:-1], np.uint8(255))  # of what may have been brighter than white
     beside = np.ones((3, 3), np.uint8)
-    above = cv2.subtract(now, cv2.dilate(then, beside))
-    below = cv2.subtract(cv2.erode(then, beside), now)
+    above = cv2.subtract(now, cv2.dilate(cv2.LUT(then, most), beside))
+    below = cv2.subtract(cv2.erode(cv2.LUT(then, least), beside), now)
     difference = cv2.max(above, below)
     right, down = _of_corners(image.shape, movement).max(axis=0) > _STILL
     left, up = _of_corners(image.shape, movement).min(axis=0) < -_STILL
@@ -285,6 +291,13 @@ def _changed(
         difference[strip] = cv2.subtract(cv2.dilate(shown, beside), cv2.erode(shown, beside))
     limit = _NOISE * usual_noise(now) + _STEP
     return cv2.threshold(difference, limit, 1, cv2.THRESH_BINARY)[1]
+
+
+def _gain(now: np.ndarray, then: np.ndarray) -> float:
+    """Return by how much all gray values have grown, as a factor."""
+    now, then = (it[::_EVERY, ::_EVERY] for it in (now, then))
+    telling = (then >= _DARK) & (np.maximum(now, then) < 255)
+    return float(np.median(now[telling] / then[telling])) if telling.any() else 1.0
 
 
 def _part(shape: tuple[int, int], turn: int, interval: int) -> Part | None:

@@ -71,6 +71,21 @@ def test_a_pattern_moves_over_targets() -> None:
     assert len(followed(results[-1])) >= 6
 
 
+@pytest.mark.parametrize('scene', [WALL, STRIPES], ids=['even', 'stripes'])
+def test_light_that_flickers_as_a_whole_is_nothing_new(scene: SceneSettings) -> None:
+    wall, identifier = render(scene).image, create_identifier(**FAMILY)
+    shown = wall * 1.15  # what is bright is white
+    for number, gain in enumerate((1.0, 0.9, 1.05, 0.93)):
+        image = noisy(shown * gain, number)
+        check_alike(identifier.identify(image), create_identifier(**FAMILY).identify(image))
+        assert identifier.memory.seen is not None
+        assert identifier.memory.seen.still == number
+    shadow = image.copy()
+    shadow[:200, :200] //= 2
+    identifier.identify(shadow)
+    assert identifier.memory.seen.still == 0
+
+
 def test_targets_are_covered_uncovered_and_replaced() -> None:
     wall = render(WALL)
     first, second = wall.targets[:2]
