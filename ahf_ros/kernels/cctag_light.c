@@ -9,79 +9,19 @@
 #include "kernels.h"
 #include "robust.h"
 
-enum { SMOOTH = 6, EDGES = 3, OF_EDGE = 5, UNKNOWNS = SMOOTH + 5 * EDGES };
+enum { SMOOTH = 6, UNKNOWNS = SMOOTH + 5 * MOST_EDGES };
 #define SQRT_2_PI 2.50662827463100050242
 
-/* An edge of light: direction, rad, offset, curvature, height and ln of width, in usual widths. */
-struct edge {
-    float cosine, sine, offset, half, narrow, height, more;
-};
-
-static struct edge edge_of(const double edge[OF_EDGE], double width)
+void cctag_light(count k, count m, count n, const float places[2][m][n],
+                 const double heights[k][5], const double edges[k][3][5], const double width[k],
+                 const double blur[k], const float slope[k][n], float plain[k][m][n],
+                 float mixed[k][m][n])
 {
-    double cosine, sine, height = fabs(edge[3]) < 0.01 ? 0.01 : edge[3];
-    cosine_and_sine(edge[0], &cosine, &sine);
-    return (struct edge){.cosine = (float)cosine,
-                         .sine = (float)sine,
-                         .offset = (float)edge[1],
-                         .half = (float)(edge[2] / 2),
-                         .narrow = (float)(1 / (width * exponential(edge[4]))),
-                         .height = (float)height,
-                         .more = (float)(exponential(height) - 1)};
-}
-
-/* Steps of ln of light at an edge, in its heights: blur mixes light, and not its logarithm. */
-static void add_steps(count q, const struct edge *by, float height, const float x[q],
-                      const float y[q], float sum[q])
-{
-    for (count i = 0; i < q; i++) {
-        float across = by->cosine * x[i] + by->sine * y[i] - by->offset;
-        float along = by->cosine * y[i] - by->sine * x[i];
-        float away = (across - by->half * (across * across + along * along)) * by->narrow;
-        float share = normal_share_f(away, exponential_f(-0.5f * away * away));
-        sum[i] += height * logarithm_f(1 + by->more * share) / by->height;
-    }
-}
-
-void cctag_light(count k, count m, count n, const double there[k][3][3],
-                 const double directions[2][m], const double radii[n], const double heights[k][5],
-                 const double edges[k][3][5], const double width[k], const double blur[k],
-                 const float slope[k][n], double most, float plain[k][m][n], float mixed[k][m][n],
-                 float light[k][m][n], float rows[2][n])
-{
-    float *x = rows[0], *y = rows[1];
-    double step = n > 1 ? radii[1] - radii[0] : 1;
     for (count i = 0; i < k; i++) {
-        struct edge by[EDGES];
-        for (int e = 0; e < EDGES; e++)
-            by[e] = edge_of(edges[i][e], width[i]);
-        for (count a = 0; a < m; a++) {
-            float along[3], centre[3], by_x = (float)heights[i][0], by_y = (float)heights[i][1];
-            for (int axis = 0; axis < 3; axis++) {
-                const double *of = there[i][axis];
-                along[axis] = (float)(of[0] * directions[0][a] + of[1] * directions[1][a]);
-                centre[axis] = (float)of[2];
-            }
-            float *sum = plain[i][a], *own = mixed[i][a];
-            for (count j = 0; j < n; j++) {
-                float radius = (float)radii[j], scale = along[2] * radius + centre[2];
-                x[j] = (along[0] * radius + centre[0]) / scale;
-                y[j] = (along[1] * radius + centre[1]) / scale;
-            }
-            for (count j = 0; j < n; j++)
-                sum[j] = by_x * x[j] + by_y * y[j];
-            for (int e = 0; e < EDGES; e++)
-                if (heights[i][2 + e] != 0)
-                    add_steps(n, &by[e], (float)heights[i][2 + e], x, y, sum);
-            /* What blur adds where light and ink change at once, to the second order. */
-            float twice = (float)(blur[i] / (2 * step)), once = (float)(blur[i] / step);
-            for (count j = 1; j < n - 1; j++)
-                own[j] = (sum[j + 1] - sum[j - 1]) * twice * slope[i][j];
-            own[0] = n > 1 ? (sum[1] - sum[0]) * once * slope[i][0] : 0;
-            own[n - 1] = n > 1 ? (sum[n - 1] - sum[n - 2]) * once * slope[i][n - 1] : 0;
-            for (count j = 0; j < n; j++)
-                light[i][a][j] = exponential_f(held_f(sum[j] + own[j], -(float)most, (float)most));
-        }
+        struct light light = light_of(heights[i], edges[i], width[i]);
+        for (count a = 0; a < m; a++)
+            light_along(n, &light, places[0][a], places[1][a], blur[i], slope[i], plain[i][a],
+                        mixed[i][a]);
     }
 }
 
@@ -147,7 +87,7 @@ void cctag_edges(count k, count m, count n, const float values[k][m][n],
                  double heights[k][9], float rest[k][m][n], double variance[k],
                  float basis[21][m][n], float planes[5][m][n], float columns[3][n])
 {
-    count q = m * n, e_count = number < 0 ? 0 : number > EDGES ? EDGES : number;
+    count q = m * n, e_count = number < 0 ? 0 : number > MOST_EDGES ? MOST_EDGES : number;
     const float *x = places[0][0], *y = places[1][0];
     float(*sums)[n] = columns, *column = columns[2];
     float(*changing)[n] = planes[0], (*tried)[n] = planes[1], (*weighted)[n] = planes[2];
@@ -164,11 +104,11 @@ void cctag_edges(count k, count m, count n, const float values[k][m][n],
         less_means(m, n, weight[i], changing, sums);
         for (int b = 0; b < SMOOTH; b++)
             less_means(m, n, weight[i], basis[b], sums);
-        double now[EDGES][OF_EDGE], damping = 1e-3;
-        for (count e = 0; e < EDGES; e++)
+        double now[MOST_EDGES][OF_EDGE], damping = 1e-3;
+        for (count e = 0; e < MOST_EDGES; e++)
             for (int c = 0; c < OF_EDGE; c++)
                 now[e][c] = edges[i][e][c] = e < e_count ? start[i][e][c] : 0;
-        for (int b = 0; b < SMOOTH + EDGES; b++)
+        for (int b = 0; b < SMOOTH + MOST_EDGES; b++)
             heights[i][b] = 0;
         for (int round = 0; round <= rounds; round++) {
             double found[UNKNOWNS], extra[UNKNOWNS] = {0};
@@ -254,7 +194,7 @@ void cctag_edges(count k, count m, count n, const float values[k][m][n],
             for (count a = 0; a < m; a++)
                 for (count j = 0; j < n; j++)
                     rest[i][a][j] = tried[a][j];
-            for (count e = 0; e < EDGES; e++)
+            for (count e = 0; e < MOST_EDGES; e++)
                 for (int c = 0; c < OF_EDGE; c++)
                     edges[i][e][c] = now[e][c];
             for (count b = 0; b < size; b++)

@@ -10,7 +10,7 @@
 #include "robust.h"
 
 /* Where parameters are: seven of the frame are first, and the values of `struct formed`. */
-enum { SHIFT = 7, BLUR, CONTRAST, SLOPES, EDGES = 12, OF_EDGE = 5, MOST_EDGES = 3, MOST = 27 };
+enum { SHIFT = 7, BLUR, CONTRAST, SLOPES, EDGES = 12, MOST = 27 };
 /* What is blurred: what is seen, its changes by the print, by the blur, and by edges of light. */
 enum { SEEN, OF_FRAME, OF_SHIFT = 8, OF_CONTRAST, OF_BLUR, OF_LIGHT, IMAGES = 20 };
 /* Rows of fine points, besides these. */

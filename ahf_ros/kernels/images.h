@@ -3,6 +3,8 @@
 #ifndef AHF_IMAGES_H
 #define AHF_IMAGES_H
 
+#include <math.h>
+
 #include "elementary.h"
 #include "kernels.h"
 
@@ -40,6 +42,46 @@ static inline double byte_at(count h, count w, const uint8_t gray[h][w], double 
     struct pixels at = pixels_at(h, w, x, y);
     return between(gray[at.upper][at.left], gray[at.upper][at.right], gray[at.lower][at.left],
                    gray[at.lower][at.right], at.across, at.down);
+}
+
+/* Places of single precision, held within an image: the pixel above and to the left of each, which is
+   none of the last row or column, how far beyond that it is, and how far it was outside. */
+enum { POINTS = 64 };
+typedef struct {
+    int32_t left[POINTS], top[POINTS];
+    float across[POINTS], down[POINTS], outside[POINTS];
+} places;
+
+/* The last pixel but some of a side, as far as floats know whole numbers. */
+static inline float last(count side, count but)
+{
+    count place = side > but ? side - but : 0;
+    return (float)(place < 1 << 24 ? place : 1 << 24);
+}
+
+static inline void hold(count h, count w, count n, const float column[n], const float row[n],
+                        places *at)
+{
+    float last_column = last(w, 1), last_row = last(h, 1);
+    float last_left = last(w, 2), last_top = last(h, 2);
+    for (count a = 0; a < n; a++) {
+        float right = lesser_f(greater_f(column[a], 0), last_column);
+        float low = lesser_f(greater_f(row[a], 0), last_row);
+        at->outside[a] = fabsf(right - column[a]) + fabsf(low - row[a]);
+        at->left[a] = (int32_t)lesser_f(right, last_left);
+        at->top[a] = (int32_t)lesser_f(low, last_top);
+        at->across[a] = right - (float)at->left[a];
+        at->down[a] = low - (float)at->top[a];
+    }
+}
+
+static inline float value_of(count h, count w, const float image[h][w], const places *at, count a)
+{
+    const float *upper = image[at->top[a]], *lower = image[at->top[a] + (h > 1)];
+    count left = at->left[a], next = left + (w > 1);
+    float over = upper[left] + at->across[a] * (upper[next] - upper[left]);
+    float under = lower[left] + at->across[a] * (lower[next] - lower[left]);
+    return over + at->down[a] * (under - over);
 }
 
 #endif

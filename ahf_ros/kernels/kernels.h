@@ -112,13 +112,12 @@ void predicted_angles(count k, count m, const float best[k][m], const float furt
 
 /* cctag_light.c */
 
-/* ln of the light about targets in frames, `there`, of that of their light; what blur adds to it
-   where ink changes as well, by its slope along the radius; and light with both. */
-void cctag_light(count k, count m, count n, const double there[k][3][3],
-                 const double directions[2][m], const double radii[n], const double heights[k][5],
-                 const double edges[k][3][5], const double width[k], const double blur[k],
-                 const float slope[k][n], double most, float plain[k][m][n], float mixed[k][m][n],
-                 float light[k][m][n], float rows[2][n]);
+/* ln of light at places, and what blur adds to it where ink changes as well, by its slope along the
+   radius; `blur` is its variance, in steps of the radius and in radii. */
+void cctag_light(count k, count m, count n, const float places[2][m][n],
+                 const double heights[k][5], const double edges[k][3][5], const double width[k],
+                 const double blur[k], const float slope[k][n], float plain[k][m][n],
+                 float mixed[k][m][n]);
 
 /* Edges of light that some settle at, or that are known if there are no rounds, and the heights of
    slopes, moves of frames and edges. */
@@ -238,6 +237,35 @@ void highest_cells(count n, const int64_t cells[n], const float values[n], int64
 void vote_peaks(count rows, count wide, count most, const uint16_t votes[rows][wide], float own,
                 float needed, float enough, float flat, int64_t reach, int64_t cells[most],
                 float sums[most], float shift[2][most], bool highest[most]);
+
+/* cctag_rays.c */
+
+/* Gray values at n evenly spaced radii of m rays of targets, over the light, whose slope is known at
+   s radii, and over their mean. Where a share of them, `many`, is beyond the limits up to which none
+   is clipped, `apart` is not 0: so many radii away is what interpolation mixes with each, by the share
+   `mixed`, and nothing is brighter than `highest`. */
+void cctag_lit(count h, count w, count k, count m, count n, count s, const float gray[h][w],
+               const double frames[k][3][3], const double directions[2][m], const double radii[n],
+               const double lights[k][3][3], const double heights[k][5],
+               const double edges[k][3][5], const double width[k], const double blur[k],
+               const float slope[k][s], const double known[s], double most,
+               const double limits[2], double white, double many, double interpolated,
+               float values[k][m][n], float highest[k][m][n], float mixed[k][m][n],
+               int32_t apart[k], float rows[5][n]);
+/* Rays as linear functions of ink, paper + step ink, whose weights lose outliers in some rounds: an
+   error of `outlier` usual deviations leaves a quarter. Then the normal equations of changes of the
+   frame and of edges, without what another paper and ink of a ray explain. The model is what a camera
+   that does not clip sees, and the gain how what is seen changes by it. */
+void cctag_rays(count k, count m, count n, const float values[k][m][n],
+                const float highest[k][m][n], const float mixed[k][m][n], const int32_t apart[k],
+                const float ink[k][n], const float by_radius[k][n], const float by_shift[k][n],
+                const float by_blur[k][n], const float by_sharpening[k][n], const float along[n],
+                const double around[m][7], int16_t rounds, double outlier, double other_contrast,
+                double quiet, double normal_spread, double least, int16_t rounds_of_clipped,
+                double least_gain, float weight[k][m][n], float model[k][m][n],
+                float errors[k][m][n], float gain[k][m][n], double step[k][m], double variance[k],
+                double normal[k][10][10], double right[k][10], double contrast[2][m],
+                double sizes[n], float products[n][36], float basis[n][8], float rows[2][n]);
 
 /* cctag_rings.c */
 

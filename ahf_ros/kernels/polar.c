@@ -3,41 +3,21 @@
 #include <math.h>
 
 #include "elementary.h"
+#include "images.h"
 #include "kernels.h"
 #include "robust.h"
-
-/* Points of an image, held within it: the pixel above and to the left of each, which is none of the
-   last row or column, how far beyond that it is, and how far it was outside. */
-enum { POINTS = 64 };
-typedef struct {
-    int32_t left[POINTS], top[POINTS];
-    float across[POINTS], down[POINTS], outside[POINTS];
-} places;
-
-/* The last pixel but some of a side, as far as floats know whole numbers. */
-static inline float last(count side, count but)
-{
-    count place = side > but ? side - but : 0;
-    return (float)(place < 1 << 24 ? place : 1 << 24);
-}
 
 /* Points at a radius in n directions, which a frame has made those of an image. */
 static inline void place(count h, count w, count n, const float along[3][POINTS],
                          const float centre[3], float radius, places *at)
 {
-    float last_column = last(w, 1), last_row = last(h, 1);
+    float column[POINTS], row[POINTS];
     for (count a = 0; a < n; a++) {
         float scale = along[2][a] * radius + centre[2];
-        float column = (along[0][a] * radius + centre[0]) / scale;
-        float row = (along[1][a] * radius + centre[1]) / scale;
-        float right = lesser_f(greater_f(column, 0), last_column);
-        float low = lesser_f(greater_f(row, 0), last_row);
-        at->outside[a] = fabsf(right - column) + fabsf(low - row);
-        at->left[a] = (int32_t)lesser_f(right, last(w, 2));
-        at->top[a] = (int32_t)lesser_f(low, last(h, 2));
-        at->across[a] = right - (float)at->left[a];
-        at->down[a] = low - (float)at->top[a];
+        column[a] = (along[0][a] * radius + centre[0]) / scale;
+        row[a] = (along[1][a] * radius + centre[1]) / scale;
     }
+    hold(h, w, n, column, row, at);
 }
 
 /* What a frame makes of the centre, and of up to POINTS directions. */
@@ -61,7 +41,6 @@ void circle_values(count h, count w, count k, count r, count m, const float imag
 {
     places at;
     float along[3][POINTS], centre[3], until[POINTS];
-    count right = w > 1, below = h > 1;
     for (count b = 0; b < k; b++) {
         float range = 1 - lift[b] / 255;
         for (count start = 0; start < m; start += POINTS) {
@@ -72,14 +51,9 @@ void circle_values(count h, count w, count k, count r, count m, const float imag
             for (count j = 0; j < r; j++) {
                 float before = j > 0 ? (float)radii[b][j - 1] : 0;
                 place(h, w, n, along, centre, (float)radii[b][j], &at);
-                for (count a = 0; a < n; a++) {
-                    const float *upper = image[at.top[a]], *lower = image[at.top[a] + below];
-                    count left = at.left[a], next = left + right;
-                    float over = upper[left] + at.across[a] * (upper[next] - upper[left]);
-                    float under = lower[left] + at.across[a] * (lower[next] - lower[left]);
-                    float value = greater_f(over + at.down[a] * (under - over), 0);
-                    values[b][j][start + a] = lift[b] + range * value;
-                }
+                for (count a = 0; a < n; a++)
+                    values[b][j][start + a] =
+                        lift[b] + range * greater_f(value_of(h, w, image, &at, a), 0);
                 for (count a = 0; a < n; a++)
                     until[a] = at.outside[a] == 0 ? until[a] : lesser_f(until[a], before);
             }

@@ -60,13 +60,8 @@ def cauchy(weights: np.ndarray | float, errors: np.ndarray) -> np.ndarray:
     return weights / (1 + errors**2)
 
 
-def geman_mcclure(weights: np.ndarray | float, errors: np.ndarray) -> np.ndarray:
-    """Return weights after Geman and McClure: a quarter is left where the error is 1."""
-    return weights / (1 + errors**2) ** 2
-
-
 def geman_mcclure_gain(weights: np.ndarray, errors: np.ndarray) -> np.ndarray:
-    """Return the derivative of an error times its `geman_mcclure` weight, by the error."""
+    """Return the derivative of an error times Geman and McClure's weight, by the error."""
     squares = errors**2
     return weights * (1 - 3 * squares) / (1 + squares) ** 3
 

@@ -6,7 +6,6 @@ import pytest
 from ahf_ros.vision.robust import (
     cauchy,
     fit_linear,
-    geman_mcclure,
     geman_mcclure_gain,
     median,
     quantiles,
@@ -31,14 +30,13 @@ def test_the_spread_of_normal_errors_is_their_deviation_despite_outliers() -> No
 def test_weights_at_an_error_of_one() -> None:
     errors = np.array([0.0, 1.0, 100.0])
     assert cauchy(2.0, errors) == pytest.approx([2, 1, 0], abs=1e-3)
-    assert geman_mcclure(2.0, errors) == pytest.approx([2, 0.5, 0], abs=1e-3)
 
 
 def test_the_gain_is_the_derivative_of_the_weighted_error() -> None:
     errors, step = np.linspace(-3, 3, 25), 1e-6
     numeric = (
-        (errors + step) * geman_mcclure(1.0, errors + step)
-        - (errors - step) * geman_mcclure(1.0, errors - step)
+        (errors + step) / (1 + (errors + step) ** 2) ** 2
+        - (errors - step) / (1 + (errors - step) ** 2) ** 2
     ) / (2 * step)
     assert geman_mcclure_gain(np.ones(25), errors) == pytest.approx(numeric, abs=1e-6)
 

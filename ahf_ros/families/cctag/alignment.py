@@ -8,14 +8,13 @@ linear function of the ink of sharp rings under a normal blur.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from ahf_ros.families.cctag.light import Lights, lit
 from ahf_ros.families.cctag.prior import USUAL, Prior
-from ahf_ros.families.cctag.rays import ALONG, PROFILE, RAYS, Rays, Seen, robust_rays
+from ahf_ros.families.cctag.rays import ALONG, PROFILE, RAYS, Rays, Seen
 from ahf_ros.families.cctag.templates import MASK, MAXIMUM_SHIFT, rings_along
 from ahf_ros.prints.cctag import CctagPrint
 from ahf_ros.vision import frame
@@ -150,9 +149,8 @@ def _aligned(
     for outlier in _OUTLIERS:
         size = frame.mean_radii(frames)
         seen = lit(gray, frames, lights, count)
-        inks = rings_along(family, ids, size, *edges.T)
-        rays = robust_rays(seen, inks[0], outlier)
-        change, normal = _changed(rays, inks, frames, size, edges, prior)
+        rays = Rays.of(seen, rings_along(family, ids, size, *edges.T), outlier)
+        change, normal = _changed(rays, frames, size, edges, prior)
         frames = frame.moved(frames, change[:, :7])
         narrow, (shift, blur, sharpening) = family.narrow * size, edges.T
         most, softest = MAXIMUM_SHIFT * narrow, np.maximum(_SOFTEST * narrow, _SHARPEST)
@@ -162,27 +160,23 @@ def _aligned(
         edges = np.stack([shift, blur, sharpening], axis=1)
     covariance = frame.centre_covariance(frames, np.linalg.inv(normal)[:, :2, :2])
     seen = lit(gray, frames, lights, count)
-    rays = Rays.of(seen, rings_along(family, ids, frame.mean_radii(frames), *edges.T)[0])
+    rays = Rays.of(seen, rings_along(family, ids, frame.mean_radii(frames), *edges.T))
     return _described(seen, rays, frames, ids, edges, covariance, family.narrow, prior)
 
 
 def _changed(
     rays: Rays,
-    inks: Sequence[np.ndarray],
     frames: np.ndarray,
     size: np.ndarray,
     edges: np.ndarray,
     prior: Prior,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the changes of frames and edges, (k, 10), that rays ask for, and normal matrices."""
-    ink, slope, *by_edges = inks
-    by_radius = [slope, slope * ALONG, slope * ALONG**2]
-    normal, right = rays.equations(np.stack([*by_radius, *by_edges], axis=1), ink)
-    variance = (rays.weight * rays.errors**2).sum(axis=(1, 2)) / rays.weight.sum(axis=(1, 2))
     area = size**2 * (PROFILE[1] - PROFILE[0]) * 2 * np.pi
     # Pixels are independent.
-    each = np.minimum(area / rays.step.shape[1], 1.0) / (variance + _LEAST_VARIANCE) / _OF_VARIANCE
-    normal, right = normal * each[:, None, None], right * each[:, None]
+    each = np.minimum(area / rays.step.shape[1], 1.0) / _OF_VARIANCE
+    each /= rays.variance + _LEAST_VARIANCE
+    normal, right = rays.normal * each[:, None, None], rays.right * each[:, None]
     normal[:, range(5), range(5)] += 1e-6
     usual = usual_perspective(frames)
     normal[:, 5:7, 5:7] += usual

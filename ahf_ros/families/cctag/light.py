@@ -16,16 +16,22 @@ from itertools import product
 import numpy as np
 
 from ahf_ros import kernels
-from ahf_ros.families.cctag.rays import BLACK, PROFILE, RAYS, Limits, Seen, clipped, ray_angles
+from ahf_ros.families.cctag.rays import LIMITS, PROFILE, RAYS, WHITE, Seen, clipped, ray_angles
 from ahf_ros.families.cctag.templates import less_lines
 from ahf_ros.vision import frame
 from ahf_ros.vision.array_record import ArrayRecord
 from ahf_ros.vision.sampling import sample_circles
 
+
+def _directions(angles: np.ndarray) -> np.ndarray:
+    return np.stack([np.cos(angles), np.sin(angles)])
+
+
 _EVERY = 2  # one of so many angles and radii is looked at
 _ANGLES, _RADII = ray_angles(RAYS)[::_EVERY], PROFILE[::_EVERY].astype(np.float32)
 _STEP = float(_RADII[1] - _RADII[0])
-_X, _Y = (np.outer(of(_ANGLES), _RADII).astype(np.float32) for of in (np.cos, np.sin))
+_PLACES = (_directions(_ANGLES)[..., None] * _RADII).astype(np.float32)
+_X, _Y = _PLACES
 _MOVES = (0, 1, 3, 4)  # of a frame, that change what is on a circle
 _AROUND = frame.displacement_basis(_ANGLES, np.ones(len(_ANGLES)))[:, _MOVES].T[..., None]
 _AROUND = (_AROUND * np.stack([np.ones_like(_RADII)] * 2 + [_RADII] * 2)[:, None]).astype('f4')
@@ -50,6 +56,7 @@ _EVIDENCE = 40.0  # twice the ln of the likelihood, that an edge adds
 _LEAST_VARIANCE = 0.003**2
 _OF_CLIPPED = 0.1  # weight of gray values that are clipped
 _MANY = 0.02  # share of gray values, from which it matters that they are clipped
+_INTERPOLATED = 0.58  # distance of what linear interpolation mixes with a quarter each, px
 _BRIGHTEST = 2.0  # gray value, of the mean, that has more weight than others
 
 
@@ -68,12 +75,6 @@ class Lights(ArrayRecord):
         """Return the numbers of edges, (k,)."""
         return np.count_nonzero(self.heights[:, 2:], axis=1)
 
-    def at(self, frames: np.ndarray, angles: np.ndarray, radii: np.ndarray) -> np.ndarray:
-        """Return the light at angles (m,) and radii (n,) of frames, float32, shape (k, m, n)."""
-        there, size = np.linalg.inv(self.frames) @ frames, frame.mean_radii(self.frames)
-        slope = _interpolated(self.slope, radii)
-        return _formed(there, angles, radii, self.heights, self.edges, size, slope)[2]
-
     @staticmethod
     def about(gray: np.ndarray, frames: np.ndarray, most: int = EDGES) -> Lights:
         """Return the light about targets whose frames, (k, 3, 3), are known to about a tenth.
@@ -87,7 +88,7 @@ class Lights(ArrayRecord):
             scene = _Scene.of(gray, frames, size)
             fit = scene.fit(edges)
             slope[:], heights[:] = scene.slope, fit.heights
-            tilt = np.einsum('ks,smn->kmn', fit.heights[:, :2], np.stack([_X, _Y]))
+            tilt = np.einsum('ks,smn->kmn', fit.heights[:, :2], _PLACES)
             plain = _less_means(scene.values - tilt, scene.weight, _PAPER)
             rows = np.arange(count)
         for number in range(most if count else 0):
@@ -119,15 +120,13 @@ def lit(
     radii: np.ndarray = PROFILE,
 ) -> Seen:
     """Return the gray values of rays at radii, evenly spaced, without their light."""
-    angles = ray_angles(rays)
-    values = np.maximum(sample_circles(gray, frames, angles, radii), BLACK)
-    some = np.flatnonzero(clipped(values).mean(axis=(1, 2)) > _MANY)
-    light = lights.at(frames, angles, radii)
-    values /= light
-    own = np.maximum(values.mean(axis=2, keepdims=True), np.float32(1e-3))
-    values /= own
-    limits = Limits.of(frames[some], radii, light[some] * own[some])
-    return Seen(values, some, limits)
+    size = frame.mean_radii(lights.frames)
+    found = kernels.cctag_lit(
+        *(gray, frames, _directions(ray_angles(rays)), radii, lights.frames, lights.heights),
+        *(lights.edges, usual_widths(size), (_LENS / size) ** 2, lights.slope, _RADII),
+        *(_MOST_LIGHT, LIMITS, WHITE, _MANY, _INTERPOLATED),
+    )
+    return Seen(*found[:4])
 
 
 def shares_alike(gray: np.ndarray, frames: np.ndarray) -> np.ndarray:
@@ -182,11 +181,9 @@ class _Scene(ArrayRecord):
 
     def in_light(self, fit: _Fit) -> _Scene:
         """Return what is seen in a light that is known."""
-        here = np.tile(np.eye(3), (len(self.size), 1, 1))
         of_light = np.delete(fit.heights, np.s_[2:_OTHERS], axis=1)
-        radii, plain = _RADII.astype(float), np.ones_like(self.slope)
-        known = of_light, fit.edges, self.size, plain
-        light, change, _ = _formed(here, _ANGLES, radii, *known)
+        known = of_light, fit.edges, usual_widths(self.size), (_LENS / self.size) ** 2 / _STEP
+        light, change = kernels.cctag_light(_PLACES, *known, np.ones_like(self.slope))
         values = self.seen - change * _slopes(self.values - light, self.weight)[:, None]
         return replace(self, values=values, slope=_slopes(values - light, self.weight))
 
@@ -194,7 +191,7 @@ class _Scene(ArrayRecord):
         """Return the best heights of the first of edges (k, 3, 5), which settle in some rounds."""
         found = kernels.cctag_edges(
             *(self.values, self.weight, self.slope, usual_widths(self.size), self.area, edges),
-            *(count, np.stack([_X, _Y]), _AROUND, rounds, _USUAL_MOVES, _DEVIATIONS),
+            *(count, _PLACES, _AROUND, rounds, _USUAL_MOVES, _DEVIATIONS),
             *(_LEAST_VARIANCE, _MOST_MOVED, _MOST_CURVED, _HIGHEST),
         )
         return _Fit(*found[:4])
@@ -228,40 +225,20 @@ def _first_edges(size: int) -> tuple[np.ndarray, np.ndarray]:
     straight = product(np.pi * np.arange(_STRAIGHT) / _STRAIGHT, _OFFSETS, [0.0])
     curved = product(2 * np.pi * np.arange(_CURVED) / _CURVED, _OFFSETS, [_CURVATURE])
     edges = np.pad(np.array([*straight, *curved]), ((0, 0), (0, 2)))
-    x, y, weight = _X[_FEW], _Y[_FEW], np.sqrt(_RADII[_FEW])
-    here, heights = np.tile(np.eye(3), (len(edges), 1, 1)), np.zeros((len(edges), 2 + EDGES))
+    weight = np.sqrt(_RADII[_FEW])
+    heights = np.zeros((len(edges), 2 + EDGES))
     heights[:, 2] = 1
-    known = here, _ANGLES, _RADII[::2].astype(float), heights
     padded = np.pad(edges[:, None], ((0, 0), (0, EDGES - 1), (0, 0)))
-    sizes, flat = np.full(len(edges), _SIZES**size), np.zeros((len(edges), len(weight)))
-    steps = _formed(*known, padded, sizes, flat)[0]
-    steps = _less_means(steps, np.broadcast_to(weight**2, x.shape), _PAPER // 2) * weight
+    widths, flat = usual_widths(np.full(len(edges), _SIZES**size)), np.zeros(len(edges))
+    unmixed = flat, np.zeros((len(edges), len(weight)))
+    steps = kernels.cctag_light(_PLACES[_FEW], heights, padded, widths, *unmixed)[0]
+    steps = _less_means(steps, np.broadcast_to(weight**2, steps.shape[1:]), _PAPER // 2) * weight
     steps = steps.reshape(len(edges), -1)
-    plane, _ = np.linalg.qr((np.stack([x, y]) * weight).reshape(2, -1).T)
+    plane, _ = np.linalg.qr((_PLACES[_FEW] * weight).reshape(2, -1).T)
     steps = steps - (steps @ plane) @ plane.T
     length = np.linalg.norm(steps, axis=1)
     shown = length > _SHOWN * length.max()
     return edges[shown], (steps[shown] / length[shown, None]).astype(np.float32)
-
-
-def _formed(
-    there: np.ndarray,
-    angles: np.ndarray,
-    radii: np.ndarray,
-    heights: np.ndarray,
-    edges: np.ndarray,
-    size: np.ndarray,
-    slope: np.ndarray,
-) -> tuple[np.ndarray, ...]:
-    """Return ln of light in frames of that of light, what blur adds to it, and light with both.
-
-    Blur adds to it where light and ink change at once, whose slope by the radius has the shape
-    (k, n), to the second order. All others are of the shape (k, m, n).
-    """
-    directions, blur = np.stack([np.cos(angles), np.sin(angles)]), (_LENS / size) ** 2
-    known = heights, edges, usual_widths(size), blur, slope
-    formed = kernels.cctag_light(there, directions, radii, *known, _MOST_LIGHT)
-    return tuple(formed[:3])
 
 
 def usual_widths(size: np.ndarray) -> np.ndarray:
@@ -276,15 +253,6 @@ def _less_means(basis: np.ndarray, weight: np.ndarray, paper: int = len(_RADII))
         sums[..., paper:] = sums[..., paper:].mean(axis=-1, keepdims=True)
         total[..., paper:] = total[..., paper:].mean(axis=-1, keepdims=True)
     return basis - (sums / total)[..., None, :]
-
-
-def _interpolated(values: np.ndarray, radii: np.ndarray) -> np.ndarray:
-    """Return values (k, n) that are known at `_RADII` at others (m,), as `np.interp`, (k, m)."""
-    known, values = _RADII.astype(np.float64), values.astype(np.float64)
-    at = radii.clip(known[0], known[-1])
-    below = np.searchsorted(known, at, side='right').clip(1, len(known) - 1) - 1
-    rise = np.diff(values, axis=1) / np.diff(known)
-    return rise[:, below] * (at - known[below]) + values[:, below]
 
 
 def _slopes(values: np.ndarray, weight: np.ndarray) -> np.ndarray:

@@ -122,7 +122,7 @@ def _mean_profiles(gray: np.ndarray, lights: Lights) -> tuple[np.ndarray, np.nda
         rows = np.arange(start, min(start + _PART, count))
         part = lights.select(rows)
         seen = lit(gray, part.moved, part, RAYS, _WIDE)
-        clipped[rows[seen.clipped]] = True
+        clipped[rows] = seen.apart > 0
         # A ray is seen in its own light, which is its mean up to the end of the profile.
         own = seen.values @ _RESAMPLED.mean(axis=2).T
         weight = np.float32(1 / RAYS) / np.maximum(own, np.float32(1e-3))
