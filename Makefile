@@ -31,12 +31,16 @@ EXTRAS := test$(if $(filter jazzy,$(DISTRIBUTION)),$(COMMA)docs$(COMMA)test-brow
 OLDEST_PYTHON ?= $(firstword $(foreach name,python3.10 python3.11,$(shell $(name) -c '' 2>/dev/null && echo $(name))) $(PYTHON))
 OLDEST := .venv-oldest
 
+# The compiler, from PyPI, that compiles for all systems.
+WHEELS := .venv-wheels
+
 # What a sourced ROS installation or another environment left behind does not belong in this one.
 unexport AMENT_PREFIX_PATH CMAKE_PREFIX_PATH LD_LIBRARY_PATH PYTHONPATH
 unexport _ROS_WHEELS_BOOTSTRAP_COMPLETE
 
 .PHONY: demo nodes wheels test lint site test-native test-live test-commands test-computing test-detectors \
-	coverage test-oldest test-portable test-sanitized test-kilted test-colcon yardstick browser clean
+	coverage test-oldest test-portable test-sanitized test-aarch64 test-kilted test-colcon \
+	yardstick browser clean
 .DELETE_ON_ERROR:
 
 demo: $(INSTALLED)
@@ -45,7 +49,8 @@ demo: $(INSTALLED)
 nodes: $(NODES)
 
 # The longest first, and none so long that it ends alone: two cores end at the same time.
-test: test-live test-oldest yardstick test-detectors coverage site lint test-portable test-sanitized
+test: test-live test-oldest yardstick test-detectors coverage site lint test-portable \
+	test-sanitized test-aarch64
 
 lint: $(READY)
 	$(BIN)/ruff check .
@@ -117,11 +122,26 @@ SANITIZED := build/sanitized.bin
 
 test-sanitized: $(READY)
 	mkdir -p build
-	$(BIN)/python scripts/build_kernels.py $(SANITIZED) -g -O1 -fsanitize=address,undefined \
-		-fno-sanitize-recover=all
+	$(BIN)/python scripts/build_kernels.py $(SANITIZED) -g -O1 \
+		-fsanitize=address,undefined,float-cast-overflow -fno-sanitize-recover=all
 	AHF_ROS_KERNELS=$(abspath $(SANITIZED)) ASAN_OPTIONS=detect_leaks=0 \
 		LD_PRELOAD="$$($${CC:-cc} -print-file-name=libasan.so)" \
 		$(BIN)/python -m pytest test/kernels
+
+# The same bits on another processor: qemu-user emulates it, zig compiles for it.
+EMULATED := build/aarch64
+
+ifneq ($(shell command -v qemu-aarch64),)
+test-aarch64: $(READY) $(WHEELS)/ready
+	mkdir -p build
+	$(BIN)/python -m support.emulated >$(EMULATED).c
+	$(WHEELS)/bin/python -m ziglang cc -target aarch64-linux-musl -static -Iahf_ros/kernels \
+		@ahf_ros/kernels/compile_flags.txt ahf_ros/kernels/*.c $(EMULATED).c -o $(EMULATED)
+	$(BIN)/python -m pytest test/kernels --emulated 'qemu-aarch64 $(abspath $(EMULATED))'
+else
+test-aarch64:
+	@echo 'There is no qemu-aarch64 (apt install qemu-user): kernels are not tested on aarch64.'
+endif
 
 # What talks to ROS 2, on Kilted, with no more installed than that needs; what lasts long does so on
 # Jazzy only.
@@ -132,12 +152,7 @@ test-kilted:
 		$$(grep -lrE 'rclpy|graph: ' test/bag test/clouds test/files test/nodes \
 			--include='test_*.py')
 
-# The compiler, from PyPI, compiles for all of them.
-WHEELS := .venv-wheels
-
-wheels:
-	$(PYTHON) -m venv $(WHEELS)
-	$(WHEELS)/bin/python -m pip install $(QUIET) 'setuptools>=77' ziglang
+wheels: $(WHEELS)/ready
 	for platform in $$($(WHEELS)/bin/python scripts/build_kernels.py --platforms); do \
 		$(WHEELS)/bin/python -m pip wheel $(QUIET) --no-deps --no-build-isolation --wheel-dir dist \
 			--config-settings=--build-option=--plat-name=$$platform . || exit; \
@@ -177,4 +192,9 @@ $(OLDEST)/ready: test/oldest.txt
 	$(OLDEST_PYTHON) -m venv $(OLDEST)
 	$(OLDEST)/bin/python -m pip install $(QUIET) --upgrade pip
 	$(OLDEST)/bin/python -m pip install $(QUIET) --requirement $<
+	touch $@
+
+$(WHEELS)/ready:
+	$(PYTHON) -m venv $(WHEELS)
+	$(WHEELS)/bin/python -m pip install $(QUIET) 'setuptools>=77' ziglang
 	touch $@

@@ -51,7 +51,8 @@ def compiler(platform: str | None) -> list[str]:
         return command
     if importlib.util.find_spec(ZIG):
         zig = [sys.executable, '-m', ZIG, 'cc']
-        return zig if platform is None else [*zig, '-target', TARGETS[platform]]
+        # Its own choice is the units of the processor that it runs on, which others lack.
+        return [*zig, *(['-target', TARGETS[platform]] if platform else ['-mcpu=baseline'])]
     sys.exit(f'The kernels cannot be compiled: pip install {ZIG}, or install a C compiler')
 
 

@@ -40,7 +40,8 @@ PLATFORMS = {
 HEAD = """# Where pip finds wheels
 
 `pip install .` compiles the kernels of this package, and nothing else where its dependencies have
-wheels. `make wheels` compiles them for all of these systems, on any of them.
+wheels. `make wheels` compiles them for all of these systems, on any of them. They compute the same
+bits on x86-64 and on aarch64, which [a test](architecture.md#kernels) emulates.
 
 For these machines pip was asked for them ({date}); a cell has the versions of numpy and OpenCV
 that it chose, or what has no wheel there. Printed by `python scripts/write_wheels.py`.

@@ -177,7 +177,7 @@ void word_steps(count k, count w, count p, count n, count m, const int64_t words
                     if (here != after)
                         share += after ? rising[b][0][i] : falling[b][0][i];
                     share = greater_f(lesser_f(share, 1), 0);
-                    steps[b][word][a] = (uint8_t)(share * (float)last + 0.5f);
+                    steps[b][word][a] = (uint8_t)(share * (float)within(last, 256) + 0.5f);
                     a = a + 1 < m ? a + 1 : 0;
                 }
             }
