@@ -298,9 +298,9 @@ void cctag_rays(count k, count m, count n, const float values[k][m][n],
                 weigh(m, n, along, contrast, errors[i], outlier, other_contrast, quiet,
                       normal_spread, least, contrast[1], sizes, weight[i]);
             for (count a = 0; a < m; a++) {
-                struct ray of = {values[i][a], ink[i], highest[i][a], mixed[i][a], apart[i],
-                                 least_gain, rounds_of_clipped, weight[i][a], model[i][a],
-                                 errors[i][a], gain[i][a]};
+                struct ray of = {values[i][a], ink[i], highest[i][a], mixed[i][a],
+                                 within(apart[i], n + 1), least_gain, rounds_of_clipped,
+                                 weight[i][a], model[i][a], errors[i][a], gain[i][a]};
                 fit_ray(n, &of, round > 0, rows, &step[i][a], &contrast[0][a]);
             }
         }
