@@ -180,6 +180,12 @@ class Stream(Generic[Item]):
         """Number of images that wait for the rest of their stack."""
         return self._window.fresh
 
+    @property
+    def searched(self) -> float:
+        """Time of the last identification in which it searched for a filter, s."""
+        search = self._identifier.last_search
+        return search.duration if search else 0.0
+
     def forget(self) -> tuple[Item, ...]:
         """Begin a new stack without an answer to what waits, and return what stands for it."""
         ended = self._window.end('')

@@ -1,6 +1,5 @@
 """Everything that a node publishes about an image that it has identified."""
 
-import time
 from collections.abc import Callable
 from importlib import import_module
 from types import ModuleType
@@ -15,7 +14,7 @@ from ahf_ros.clouds.matching import Waiting
 from ahf_ros.identification.stream import Answer
 from ahf_ros.msg import CodedTargetArray
 from ahf_ros.nodes.cloud import TargetPoints
-from ahf_ros.nodes.diagnostics import CloudTally, Tally
+from ahf_ros.nodes.diagnostics import ANSWER, SEARCH, CloudTally, Stages, Tally
 from ahf_ros.nodes.inputs import Input
 from ahf_ros.nodes.messages import (
     apriltag_detections,
@@ -103,16 +102,13 @@ class Answers:
         if clouds:
             clouds.close()
 
-    def publish(self, answer: Answer[Header], pipeline: Pipeline, received: float) -> None:
-        """Publish an answer of a pipeline, and count how long it took.
-
-        Its last image was `received` at that time, s of the monotonic clock.
-        """
+    def publish(self, answer: Answer[Header], pipeline: Pipeline, stages: Stages) -> None:
+        """Publish an answer of a pipeline, and count how long it took."""
         message, found = pipeline.message(answer), answer.identification
         self._targets.publish(message)
+        stages.end(ANSWER)
         self._tally.settled = answer.settled
         self._tally.answered += answer.fresh
-        self._tally.latency = time.monotonic() - received
         self._tally.last = found
         pipeline.adviser.see(answer.stack.images[0], found.count)
         pipeline.shortfall.see(found)
@@ -133,3 +129,6 @@ class Answers:
         if self._filtered_image.get_subscription_count():
             filtered = pipeline.filtered(answer)
             self._filtered_image.publish(image_message(filtered, message.header))
+        stages.end('other topics')
+        stages.spent[SEARCH] = pipeline.stream.searched
+        self._tally.times = stages.added(self._tally.times)

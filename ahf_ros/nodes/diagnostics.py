@@ -1,5 +1,8 @@
 """The status of nodes on /diagnostics, and what the nodes `detector` and `pose` count."""
 
+from __future__ import annotations
+
+import time
 from collections.abc import Callable, Iterable, Mapping
 from copy import copy
 from dataclasses import dataclass, field, replace
@@ -111,6 +114,60 @@ class CloudTally:
         }
 
 
+SEARCH = 'search for a filter'
+"""A part of the identification."""
+
+ANSWER = 'answer'
+
+STAGES = ('waiting', 'conversion', 'identification', SEARCH, ANSWER, 'other topics')
+
+
+def _no_time() -> dict[str, float]:
+    return dict.fromkeys(STAGES, 0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Times:
+    """Where the time of images went, s."""
+
+    count: int = 0  # of answers so far
+    latency: float = 0.0  # from the arrival of the last image to its answer
+    last: dict[str, float] = field(default_factory=_no_time)  # in the stages of the last image
+    sums: dict[str, float] = field(default_factory=_no_time)  # in those of all images so far
+
+    def values(self, before: Times) -> dict[str, str]:
+        """Return the entries of the diagnostics: of the last image, and means since before."""
+        count = self.count - before.count
+        entries = {'latency (s)': f'{self.latency:.4f}'}
+        for stage in STAGES:
+            spent = self.sums[stage] - before.sums[stage]
+            entries[f'{stage} (s)'] = f'{self.last[stage]:.4f}'
+            entries[f'mean {stage} (s)'] = f'{spent / count:.4f}' if count else ''
+        return entries
+
+
+class Stages:
+    """A clock of the stages of an image, one after the other."""
+
+    def __init__(self, arrived: float) -> None:
+        self._arrived = self._since = arrived  # s of the monotonic clock
+        self._latency = 0.0
+        self.spent = _no_time()
+
+    def end(self, stage: str) -> None:
+        """Count the time since the stage before."""
+        before, self._since = self._since, time.monotonic()
+        self.spent[stage] += self._since - before
+        if stage == ANSWER:
+            self._latency = self._since - self._arrived
+
+    def added(self, times: Times) -> Times:
+        """Return times with those of an answer, and begin with the next one of the image."""
+        spent, self.spent = self.spent, _no_time()
+        sums = {stage: times.sums[stage] + spent[stage] for stage in STAGES}
+        return Times(times.count + 1, self._latency, spent, sums)
+
+
 @dataclass(slots=True)
 class Tally(Stamps):
     """Counts of images since the start, and what is to be said about them; empty if nothing is."""
@@ -139,7 +196,7 @@ class Tally(Stamps):
     behind: int = 0  # images dropped since none last waited after an identification
     inactive: str = ''  # state of a managed node that is not active
     unasked: bool = False  # whether nobody subscribes to answers
-    latency: float = 0.0  # from the arrival of the last image to its answer, s
+    times: Times = field(default_factory=Times)
     settled: tuple[str, ...] = ()  # families, where all are looked for
     last: Identification = field(default_factory=lambda: Identification(()))
     clouds: CloudTally | None = None  # None while they are not subscribed to
@@ -194,7 +251,7 @@ class Diagnostics:
         used, shift = tally.last.filter, tally.last.edge_shift
         values = {
             'rate (Hz)': f'{answered / period:.2f}',
-            'latency (s)': f'{tally.latency:.3f}',
+            **tally.times.values(before.times),
             'received': tally.received,
             'answered': tally.answered,
             'dropped': tally.dropped,
@@ -208,6 +265,7 @@ class Diagnostics:
             'stacks that were not full': tally.incomplete,
             'stacks that were split': tally.split,
             'identified (n)': tally.last.count,
+            'followed': sum(target.followed for target in tally.last),
             'expected (N)': tally.last.expected,
             'N estimated': tally.last.estimated,
             'mirrored': tally.last.mirrored,

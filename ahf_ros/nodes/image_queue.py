@@ -28,10 +28,18 @@ from ahf_ros.base.text import printable
 from ahf_ros.files.image_messages import nanoseconds
 from ahf_ros.files.target_messages import DROPPED
 from ahf_ros.identification.settling import settled_families
-from ahf_ros.identification.stream import STATUS, Answer, Kind, Remark, message_frame, why_refused
+from ahf_ros.identification.stream import (
+    STATUS,
+    Answer,
+    Frame,
+    Kind,
+    Remark,
+    message_frame,
+    why_refused,
+)
 from ahf_ros.msg import CodedTargetArray
 from ahf_ros.nodes.answers import Answers
-from ahf_ros.nodes.diagnostics import Tally, seconds
+from ahf_ros.nodes.diagnostics import Stages, Tally, seconds
 from ahf_ros.nodes.pipeline import STOPPING, Pipeline, Stopping
 from ahf_ros.nodes.process import LOG_PERIOD, ProcessNode
 from ahf_ros.nodes.settings import LOSSLESS
@@ -203,7 +211,15 @@ class ImageQueue:
             self._tally.dropped += len(given_up)
             self._drop(image.pipeline, given_up, _REPLACED_NEXT)
         self._overdue.cancel()
-        self._handle(image, stream.add(lambda: message_frame(image.take()), image.header))
+        stages = Stages(image.arrived)
+        stages.end('waiting')
+
+        def read() -> Frame[Header]:
+            frame = message_frame(image.take())
+            stages.end('conversion')
+            return frame
+
+        self._handle(image, stream.add(read, image.header), stages)
         if stream.waiting:
             self._expect(image.pipeline.settings.stack_timeout)
         with self._lock:
@@ -236,13 +252,17 @@ class ImageQueue:
                 self._end(last, f'no image followed for {limit:g} s')
 
     def _end(self, last: _Waiting, why: str) -> None:
-        self._handle(last, last.pipeline.stream.end(why))
+        stages = Stages(last.arrived)
+        stages.end('waiting')
+        self._handle(last, last.pipeline.stream.end(why), stages)
 
-    def _handle(self, image: _Waiting, said: Iterable[Answer[Header] | Remark]) -> None:
+    def _handle(
+        self, image: _Waiting, said: Iterable[Answer[Header] | Remark], stages: Stages
+    ) -> None:
         """Publish the answers of a stream, and tell its remarks."""
         for it in said:
             if not isinstance(it, Remark):
-                self._publish(it, image)
+                self._publish(it, image, stages)
             elif isinstance(it.error, Stopping):
                 self._drop(image.pipeline, it.items, STOPPING)
             elif it.items:
@@ -250,9 +270,10 @@ class ImageQueue:
             else:
                 self._tell(it, image.stamp)
 
-    def _publish(self, answer: Answer[Header], image: _Waiting) -> None:
+    def _publish(self, answer: Answer[Header], image: _Waiting, stages: Stages) -> None:
+        stages.end('identification')
         try:
-            self._answers.publish(answer, image.pipeline, image.arrived)
+            self._answers.publish(answer, image.pipeline, stages)
             memory = image.pipeline.stream.memory
             if line := settled_families(memory, self._families):
                 self._logger.info(line)

@@ -9,7 +9,7 @@ pytest.importorskip('rclpy', reason='ROS 2 is not installed')
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 
 from ahf_ros.base.target import Identification, Target
-from ahf_ros.nodes.diagnostics import Diagnostics, Tally
+from ahf_ros.nodes.diagnostics import Diagnostics, Stages, Tally
 from ahf_ros.nodes.pipeline import IN_A_ROW, Shortfall
 from support.detector import values
 
@@ -41,6 +41,19 @@ def test_what_is_wrong_with_the_last_image_is_a_warning(
 def test_an_edge_shift_that_is_not_known_is_empty() -> None:
     status = Diagnostics(Tally()).status(1.0)
     assert values(DiagnosticArray(status=[status]))['edge shift (px)'] == ''
+
+
+def test_times_are_of_the_last_image_and_means_since_the_last_status() -> None:
+    tally, said = Tally(), []
+    diagnostics = Diagnostics(tally)
+    for conversions in ([0.5], [0.25, 0.75], []):
+        for conversion in conversions:
+            stages = Stages(arrived=0.0)
+            stages.spent['conversion'] = conversion
+            tally.times = stages.added(tally.times)
+        told = values(DiagnosticArray(status=[diagnostics.status(1.0)]))
+        said.append((told['conversion (s)'], told['mean conversion (s)']))
+    assert said == [('0.5000', '0.5000'), ('0.7500', '0.5000'), ('0.7500', '')]
 
 
 def test_advice_is_a_warning_while_nothing_is_identified() -> None:

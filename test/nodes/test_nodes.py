@@ -23,6 +23,7 @@ from std_srvs.srv import Trigger
 
 from ahf_ros.base.settings.nested import flat_parameters
 from ahf_ros.msg import CodedTargetArray
+from ahf_ros.nodes.diagnostics import ANSWER, SEARCH, STAGES
 from ahf_ros.nodes.messages import image_message
 from ahf_ros.nodes.settings import DetectorNodeSettings
 from ahf_ros.scenes.scene import Rendering, SceneSettings, render
@@ -288,6 +289,25 @@ def test_images_for_those_who_look(
     assert filtered[0].data == message.data  # no filter was needed
     drawn = np.frombuffer(debug[0].data, np.uint8).reshape(*rendering.image.shape, 3)
     assert (drawn != rendering.image[:, :, None]).any()
+
+
+def test_diagnostics_tell_where_the_time_of_an_image_went(
+    graph: Any, detector: DetectorProcess, message: Image
+) -> None:
+    detector.reset()  # it searches for a filter again
+    assert detector.set(('expected_targets', 7), ('max_evaluations', 3)) == (True, '')
+    mean = f'mean {ANSWER} (s)'
+    graph.until(lambda: not values(graph.newer(detector.diagnostics))[mean])
+    detector.diagnostics.clear()
+    detector.answer(message)
+    told = graph.until(lambda: [it for it in map(values, detector.diagnostics) if it[mean]])[0]
+    last = {stage: float(told[f'{stage} (s)']) for stage in STAGES}
+    assert last == {stage: float(told[f'mean {stage} (s)']) for stage in STAGES}
+    assert 0 < last[SEARCH] <= last['identification']
+    assert all(time >= 0 for time in last.values())
+    until_answered = sum(last.values()) - last[SEARCH] - last['other topics']
+    assert float(told['latency (s)']) == pytest.approx(until_answered, abs=5e-4)  # rounded
+    assert detector.set(('expected_targets', 0), ('max_evaluations', 50)) == (True, '')
 
 
 def test_parameters_are_answered_and_the_latest_image_waits_during_a_search(

@@ -18,7 +18,7 @@ import time
 from collections.abc import Callable, Generator, Sequence
 from concurrent.futures import Executor, wait
 from contextlib import closing
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -102,6 +102,8 @@ class SearchResult:
         tried.
     in_vain : int
         Number of evaluations at the end that were not better than those before.
+    duration : float
+        Its time, s, with what confirms it on the whole image.
     """
 
     tried: tuple[Values, ...]
@@ -109,6 +111,7 @@ class SearchResult:
     history: tuple[int, ...]
     reason: str
     in_vain: int
+    duration: float = field(default=0.0, compare=False)
 
     @property
     def values(self) -> Values:

@@ -401,6 +401,7 @@ class Identifier:
             reference = searched.discrepancy(expected, plain, executor)
         elif settings.tuning.search != PUBLISHED:
             initial += [(*values, *combination) for values in BEGINNING]
+        begun = self._clock()
         result = search(
             partial(searched.discrepancy, expected),
             genes,
@@ -424,7 +425,7 @@ class Identifier:
             remembered=best if better else kept,
             evaluations=evaluations,
             tried=tried,
-            search=result,
+            search=replace(result, duration=self._clock() - begun),
         )
 
     def _steady(self, trials: Trials, executor: Executor | None) -> _Choice | None:
