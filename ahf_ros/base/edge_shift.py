@@ -8,7 +8,6 @@ have a gamma.
 """
 
 from collections.abc import Iterable
-from statistics import median
 
 from ahf_ros.base.target import UNDECODED, Target
 
@@ -33,7 +32,11 @@ def median_edge_shift(targets: Iterable[Target]) -> float | None:
         for target in targets
         if target.id != UNDECODED and target.edge_shift is not None
     ]
-    return median(shifts) if shifts else None
+    if not shifts:
+        return None
+    import numpy as np  # as in `ahf_ros.base.target`
+
+    return float(np.median(shifts))
 
 
 def edge_shift_remark(shift: float | None) -> str:

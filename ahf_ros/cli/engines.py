@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -64,6 +65,18 @@ def create_engine(
 def _threads_each(jobs: int) -> int:
     """Return the number of threads of each of several processes on this machine."""
     return max(available_cores() // max(jobs, 1), 1)
+
+
+@contextmanager
+def tracker(
+    shown: bool, total: int, description: str
+) -> Iterator[Callable[[Iterable[Any]], Iterable[Any]]]:
+    """Return what yields the items that it is given, and shows on a bar how many were taken."""
+    if not (shown and sys.stderr.isatty()):  # nor is what draws bars imported
+        yield iter
+        return
+    with progress_bar(shown) as progress:
+        yield partial(progress.track, total=total, description=description)
 
 
 def progress_bar(shown: bool, *columns: ProgressColumn) -> Progress:

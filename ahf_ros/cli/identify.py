@@ -27,7 +27,7 @@ from ahf_ros.base.text import listed, shown
 from ahf_ros.batch.engine import Engine, EngineLost, available_cores
 from ahf_ros.batch.task import ImageOutcome, ImageTask, Level, with_machine
 from ahf_ros.cli import say, tell
-from ahf_ros.cli.engines import create_engine, progress_bar, shared_settings
+from ahf_ros.cli.engines import create_engine, shared_settings, tracker
 from ahf_ros.cli.export import add_export_arguments, check_control, control_from, write_exports
 from ahf_ros.cli.options import (
     add_image_options,
@@ -131,10 +131,11 @@ def _run(options: argparse.Namespace, output: TextIO | None) -> int:
         with_machine,
         isolated=is_foreign(settings.detector),
     )
-    with closing(engine), progress_bar(len(tasks) > 1 and not options.quiet) as progress:
+    shown = len(tasks) > 1 and not options.quiet
+    with closing(engine), tracker(shown, len(tasks), 'identify') as track:
         try:
             outcomes = _outcomes(engine, settled_tasks(engine, tasks), options)
-            for outcome in progress.track(outcomes, total=len(tasks), description='identify'):
+            for outcome in track(outcomes):
                 print_outcome('identify', outcome, output, options.quiet)
                 failed |= outcome.failed
                 for record in outcome.records:

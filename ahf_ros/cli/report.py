@@ -1,12 +1,11 @@
 """`ahf report`: results as one page to look at."""
 
 import argparse
-from functools import partial
 from pathlib import Path
 
 from ahf_ros.base.text import counted
 from ahf_ros.cli import say, tell
-from ahf_ros.cli.engines import progress_bar
+from ahf_ros.cli.engines import tracker
 from ahf_ros.cli.options import (
     add_input,
     add_options,
@@ -44,8 +43,8 @@ def run(options: argparse.Namespace) -> int:
             tell('report', problem)
         if not results:
             raise ValueError('there is no result, accepted is at least one')
-        with progress_bar(len(results) > 1 and not options.quiet) as progress:
-            track = partial(progress.track, total=len(results), description='report')
+        shown = len(results) > 1 and not options.quiet
+        with tracker(shown, len(results), 'report') as track:
             lost = write_page(
                 options.output, results, settings, title, truth, options.images, track
             )

@@ -16,7 +16,6 @@ from contextlib import suppress
 from dataclasses import replace
 from itertools import islice
 from math import ceil
-from statistics import median
 
 import cv2
 import numpy as np
@@ -184,7 +183,7 @@ def _lines(
     if learnt := _learnt([dots_in(middle, DetectorSettings())]):
         yield from _of_bands(learnt, _ENLARGED, settings, expected)
     elif small := _identified(middle, replace(settings, max_radius=_largest_told(settings))):
-        radius = median(target.semi_major for target in small) / _ENLARGED
+        radius = float(np.median([target.semi_major for target in small])) / _ENLARGED
         yield _of_size(len(small), radius, settings.narrowed({it.family for it in small}))
 
 
