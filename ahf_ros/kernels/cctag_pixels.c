@@ -15,9 +15,9 @@ enum { SHIFT = 7, BLUR, CONTRAST, SLOPES, EDGES = 12, MOST = 27 };
 enum { SEEN, OF_FRAME, OF_SHIFT = 8, OF_CONTRAST, OF_BLUR, OF_LIGHT, IMAGES = 20 };
 /* Rows of fine points, besides these. */
 enum { AWAY = IMAGES, LIGHT_AWAY, X, Y, LIGHT_X, LIGHT_Y, LIGHT, INK, RADIUS, SCALE, BY_RADIUS, BY_SHIFT, ROWS };
-enum { MARGIN = 3, TAPS = 20, MASK_TAPS = 8 };
+enum { MARGIN = 3, TAPS = 20, MASK_TAPS = 5 };
 #define SHARP 0.20412414523193150818 /* blur of what is sharp, px: a triangle over two points */
-#define BEYOND 5.0 /* deviations, beyond which blur mixes nothing */
+#define BEYOND 3.5 /* deviations, beyond which blur mixes nothing */
 #define DARK 1e-4f /* light, of that on paper, that is black */
 #define SQRT_2_PI 2.50662827463100050242
 
@@ -225,16 +225,17 @@ static void take(count h, count w, count images, const struct camera *camera,
                  float over[w],
                  float mixed[h][IMAGES][w], float scratch[h][IMAGES][w])
 {
-    if (camera->gamma != 1)
-        for (count i = MARGIN; i < h - MARGIN; i++)
-            for (count j = MARGIN; j < w - MARGIN; j++) {
-                float first = greater_f(mixed[i][SEEN][j], DARK);
-                float gray = (float)exponential(logarithm(first) / camera->gamma);
-                float change = gray / first / (float)camera->gamma;
-                mixed[i][SEEN][j] = gray;
-                for (count p = 1; p < images; p++)
-                    mixed[i][p][j] *= change;
-            }
+    for (count i = MARGIN; i < h - MARGIN && camera->gamma != 1; i++) {
+        float power = (float)(1 / camera->gamma);
+        for (count j = MARGIN; j < w - MARGIN; j++) {
+            float first = greater_f(mixed[i][SEEN][j], DARK);
+            mixed[i][SEEN][j] = exponential_f(logarithm_f(first) * power);
+            over[j] = mixed[i][SEEN][j] / first * power;
+        }
+        for (count p = 1; p < images; p++)
+            for (count j = MARGIN; j < w - MARGIN; j++)
+                mixed[i][p][j] *= over[j];
+    }
     if (camera->sharpening == 0)
         return;
     float weights[MASK_TAPS + 1], more = (float)camera->sharpening;

@@ -8,6 +8,7 @@ linear function of the ink of sharp rings under a normal blur.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,6 +26,7 @@ from ahf_ros.vision.robust import medians, quantiles
 
 _PART = 48  # targets at a time, which bounds the memory
 _OUTLIERS = 12.0, 6.0, 3.0, 3.0  # deviations that quarter a weight, in rounds of Gauss-Newton
+_IN_PLACE = 2  # rounds less, where rings are nearly in place
 _MAXIMUM_CHANGE = 0.08  # of a frame in a round, radii
 _PERSPECTIVE = 5e-4  # change of scale along a px where tilted by 45 degrees: 1 / focal length, px
 _LEAST_TILT = 0.1  # tangent of the tilt that a circular target may have
@@ -114,11 +116,13 @@ def align(
     prior: Prior = USUAL,
     lights: Lights | None = None,
     rays: int = RAYS,
+    in_place: bool = False,
 ) -> Aligned:
     """Bring the rings of IDs (k,) onto an image from frames (k, 3, 3), known to about a tenth.
 
     The edges to begin with, (k, 3), are growth of ink and blur, px, and sharpening. The lights are
-    those about the frames, unless they are given.
+    those about the frames, unless they are given. Rings that are nearly in place take half of the
+    rounds.
     """
     if lights is None:
         lights = Lights.about(gray, frames)
@@ -128,7 +132,7 @@ def align(
         + [
             _aligned(
                 *(gray, frames[part], ids[part], edges[part]),
-                *(family, prior, lights.select(part), rays),
+                *(family, prior, lights.select(part), rays, _OUTLIERS[_IN_PLACE * in_place :]),
             )
             for part in parts
         ]
@@ -144,9 +148,10 @@ def _aligned(
     prior: Prior,
     lights: Lights,
     count: int,
+    outliers: Sequence[float],
 ) -> Aligned:
     """Return what `align` does, by Gauss-Newton with robust weights."""
-    for outlier in _OUTLIERS:
+    for outlier in outliers:
         size = frame.mean_radii(frames)
         seen = lit(gray, frames, lights, count)
         rays = Rays.of(seen, rings_along(family, ids, size, *edges.T), outlier)

@@ -30,6 +30,7 @@ OF_LIGHT = [2, _WIDTH]
 _REACH = 1.35  # radii, up to which pixels are seen
 _SHARP = 1 / math.sqrt(24)  # blur of what is sharp, px: a triangle over two of two samples a px
 _MARGIN, _OF_MASK = 4, 4  # px about the pixels, that blur and an unsharp mask mix with them
+_LEAST_SHARPENING = 0.15  # amount, below which rays often show some where there is none
 _DARK = 1e-4  # light, of that on paper, that is black
 OF_INTERPOLATION = 0.17
 """Variance that reading between pixels adds to the blur of rays, px^2."""
@@ -114,6 +115,7 @@ class Patch:
         Ink has not grown by more than `most_shift`, in radii.
         """
         target, sharpening = rings.frames[0], float(rings.sharpening[0])
+        sharpening = sharpening if sharpening > _LEAST_SHARPENING else 0.0
         reach = math.ceil(_REACH * frame.ellipse_axes(target[None])[0][0]) + _MARGIN
         reach += _OF_MASK if sharpening else 0
         corner = np.rint(target[:2, 2]).astype(int) - reach

@@ -126,7 +126,8 @@ def _settled(
     for _ in range(_REPEATS if len(moving) else 0):
         some = rings.select(moving)
         light = lights.select(moving)
-        again = align(gray, some.frames, some.ids, some.edges, family, prior, light)
+        known = some.frames, some.ids, some.edges, family, prior, light
+        again = align(gray, *known, in_place=True)
         away = again.frames[:, :2, 2] - some.frames[:, :2, 2]
         spread = away[:, :, None] * away[:, None]
         covariance = again.covariance + spread
@@ -149,13 +150,23 @@ def in_light(
     Blur mixes light, and not gray values, which matters where rings are narrow. The image is the
     same otherwise. The rings are brought onto it, in the lights that follow.
     """
-    light = as_light(gray)
-    lights = Lights.about(light, rings.frames)
-    known = rings.frames, rings.ids, rings.edges, family
-    again = align(light, *known, lights=lights)
-    clearest = np.argsort(-rings.plain, kind='stable')[:_CLEAREST]
-    weight = np.maximum(rings.of_target, again.of_target)[clearest]
-    if weight @ (again.left - rings.left + _CLEARLY)[clearest] < 0:
-        return light, again, lights
+    order = np.argsort(-rings.plain, kind='stable')
+    clearest, others = order[:_CLEAREST], order[_CLEAREST:]
+    light, some = as_light(gray), rings.select(clearest)
+    lights, again = _in_its_light(light, some, family)
+    weight = np.maximum(some.of_target, again.of_target)
+    if weight @ (again.left - some.left + _CLEARLY) >= 0:
+        light, (lights, again) = gray, _in_its_light(gray, some, family)
+    more, rest = _in_its_light(light, rings.select(others), family)
+    back = np.argsort(order)
+    joined = Aligned.joined([again, rest]), Lights.joined([lights, more])
+    again, lights = (of.select(back) for of in joined)
+    return light, again, lights
+
+
+def _in_its_light(
+    gray: np.ndarray, rings: Aligned, family: CctagPrint
+) -> tuple[Lights, Aligned]:
     lights = Lights.about(gray, rings.frames)
-    return gray, align(gray, *known, lights=lights), lights
+    known = rings.frames, rings.ids, rings.edges, family
+    return lights, align(gray, *known, lights=lights)
