@@ -25,22 +25,20 @@ void cctag_light(count k, count m, count n, const float places[2][m][n],
     }
 }
 
-/* Values less their weighted means on circles. */
-static void less_means(count m, count n, const float weight[m][n], float values[m][n],
-                       float sums[2][n])
+/* Values less their weighted means on circles; `over` is one over the sums of weights. */
+static void less_means(count m, count n, const float weight[m][n], const float over[n],
+                       float values[m][n], float means[n])
 {
     for (count j = 0; j < n; j++)
-        sums[0][j] = sums[1][j] = 0;
-    for (count a = 0; a < m; a++)
-        for (count j = 0; j < n; j++) {
-            sums[0][j] += weight[a][j] * values[a][j];
-            sums[1][j] += weight[a][j];
-        }
-    for (count j = 0; j < n; j++)
-        sums[0][j] /= sums[1][j];
+        means[j] = 0;
     for (count a = 0; a < m; a++)
         for (count j = 0; j < n; j++)
-            values[a][j] -= sums[0][j];
+            means[j] += weight[a][j] * values[a][j];
+    for (count j = 0; j < n; j++)
+        means[j] *= over[j];
+    for (count a = 0; a < m; a++)
+        for (count j = 0; j < n; j++)
+            values[a][j] -= means[j];
 }
 
 /* Weighted sum of products, in columns of single precision. */
@@ -58,23 +56,40 @@ static double product(count m, count n, const float weighted[m][n], const float 
     return sum;
 }
 
+static void multiply(count q, const float weight[q], const float values[q], float weighted[q])
+{
+    for (count p = 0; p < q; p++)
+        weighted[p] = weight[p] * values[p];
+}
+
+/* Set the products of planes of a basis with the first of some, which those before have already. */
+static void set_normal(count m, count n, count first, count size, const float weight[m][n],
+                       float basis[UNKNOWNS][m][n], float weighted[m][n], float columns[n],
+                       double normal[UNKNOWNS][UNKNOWNS])
+{
+    for (count a = first; a < size; a++) {
+        multiply(m * n, weight[0], basis[a][0], weighted[0]);
+        for (count b = 0; b <= a; b++)
+            normal[b][a] = normal[a][b] = product(m, n, weighted, basis[b], columns);
+    }
+}
+
 /* Solve normal equations of planes of a basis for what is to be explained. */
 static void solve_planes(count m, count n, count size, const float weight[m][n],
-                         float basis[UNKNOWNS][m][n], const float rest[m][n], double damping,
+                         float basis[UNKNOWNS][m][n], const float rest[m][n],
+                         double known[UNKNOWNS][UNKNOWNS], double damping,
                          const double extra[UNKNOWNS], float weighted[m][n], float columns[n],
                          double found[UNKNOWNS])
 {
     double normal[size][size];
+    set_normal(m, n, SMOOTH, size, weight, basis, weighted, columns, known);
+    multiply(m * n, weight[0], rest[0], weighted[0]);
     for (count a = 0; a < size; a++) {
-        for (count i = 0; i < m; i++)
-            for (count j = 0; j < n; j++)
-                weighted[i][j] = weight[i][j] * basis[a][i][j];
-        for (count b = a; b < size; b++)
-            normal[a][b] = product(m, n, weighted, basis[b], columns);
-        found[a] = product(m, n, weighted, rest, columns);
+        for (count b = 0; b < size; b++)
+            normal[a][b] = known[a][b];
+        found[a] = product(m, n, weighted, basis[a], columns);
         normal[a][a] = normal[a][a] * (1 + damping) + extra[a] + 1e-7;
     }
-    mirror(size, normal);
     solve(size, 1, normal, (double(*)[1])found);
 }
 
@@ -89,7 +104,8 @@ void cctag_edges(count k, count m, count n, const float values[k][m][n],
 {
     count q = m * n, e_count = number < 0 ? 0 : number > MOST_EDGES ? MOST_EDGES : number;
     const float *x = places[0][0], *y = places[1][0];
-    float(*sums)[n] = columns, *column = columns[2];
+    float *means = columns[0], *over = columns[1], *column = columns[2];
+    double normal[UNKNOWNS][UNKNOWNS];
     float(*changing)[n] = planes[0], (*tried)[n] = planes[1], (*weighted)[n] = planes[2];
     float *power = planes[3][0], *away = planes[4][0];
     for (count i = 0; i < k; i++) {
@@ -101,9 +117,16 @@ void cctag_edges(count k, count m, count n, const float values[k][m][n],
                 for (int b = 0; b < 4; b++)
                     basis[2 + b][a][j] = -slope[i][j] * around[b][a][j];
             }
-        less_means(m, n, weight[i], changing, sums);
+        for (count j = 0; j < n; j++) {
+            float sum = 0;
+            for (count a = 0; a < m; a++)
+                sum += weight[i][a][j];
+            over[j] = 1 / sum;
+        }
+        less_means(m, n, weight[i], over, changing, means);
         for (int b = 0; b < SMOOTH; b++)
-            less_means(m, n, weight[i], basis[b], sums);
+            less_means(m, n, weight[i], over, basis[b], means);
+        set_normal(m, n, 0, SMOOTH, weight[i], basis, weighted, column, normal);
         double now[MOST_EDGES][OF_EDGE], damping = 1e-3;
         for (count e = 0; e < MOST_EDGES; e++)
             for (int c = 0; c < OF_EDGE; c++)
@@ -148,9 +171,9 @@ void cctag_edges(count k, count m, count n, const float values[k][m][n],
                         extra[SMOOTH + 4 * e + c] = variance[i] / area[i] / squared(deviations[c]);
                 }
                 for (count b = SMOOTH; b < size; b++)
-                    less_means(m, n, weight[i], basis[b], sums);
-                solve_planes(m, n, size, weight[i], basis, rest[i], damping, extra, weighted,
-                             column, found);
+                    less_means(m, n, weight[i], over, basis[b], means);
+                solve_planes(m, n, size, weight[i], basis, rest[i], normal, damping, extra,
+                             weighted, column, found);
                 for (count e = 0; e < e_count; e++) {
                     static const int moving[4] = {0, 1, 2, 4};
                     for (int c = 0; c < 4; c++)
@@ -169,9 +192,10 @@ void cctag_edges(count k, count m, count n, const float values[k][m][n],
                 for (count p = 0; p < q; p++)
                     step[p] = 0;
                 add_steps(q, &by, 1, x, y, step);
-                less_means(m, n, weight[i], basis[SMOOTH + e], sums);
+                less_means(m, n, weight[i], over, basis[SMOOTH + e], means);
             }
-            solve_planes(m, n, size, weight[i], basis, changing, 0, extra, weighted, column, found);
+            solve_planes(m, n, size, weight[i], basis, changing, normal, 0, extra, weighted, column,
+                         found);
             for (count a = 0; a < m; a++)
                 for (count j = 0; j < n; j++)
                     tried[a][j] = changing[a][j];
@@ -181,9 +205,7 @@ void cctag_edges(count k, count m, count n, const float values[k][m][n],
                     for (count j = 0; j < n; j++)
                         tried[a][j] -= height * basis[b][a][j];
             }
-            for (count a = 0; a < m; a++)
-                for (count j = 0; j < n; j++)
-                    weighted[a][j] = weight[i][a][j] * tried[a][j];
+            multiply(q, weight[i][0], tried[0], weighted[0]);
             double left = product(m, n, weighted, tried, column) + least_variance;
             bool better = !round || left < variance[i];
             if (round)

@@ -16,7 +16,7 @@ import numpy as np
 from ahf_ros.families.cctag.light import Lights, lit
 from ahf_ros.families.cctag.prior import USUAL, Prior
 from ahf_ros.families.cctag.rays import ALONG, PROFILE, RAYS, Rays, Seen
-from ahf_ros.families.cctag.templates import MASK, MAXIMUM_SHIFT, rings_along
+from ahf_ros.families.cctag.templates import MASK, MAXIMUM_SHIFT, rings_along, signed_circles
 from ahf_ros.prints.cctag import CctagPrint
 from ahf_ros.vision import frame
 from ahf_ros.vision.array_record import ArrayRecord
@@ -151,11 +151,12 @@ def _aligned(
     outliers: Sequence[float],
 ) -> Aligned:
     """Return what `align` does, by Gauss-Newton with robust weights."""
+    circles, usual = signed_circles(family, ids), usual_perspective(frames)
     for outlier in outliers:
         size = frame.mean_radii(frames)
         seen = lit(gray, frames, lights, count)
-        rays = Rays.of(seen, rings_along(family, ids, size, *edges.T), outlier)
-        change, normal = _changed(rays, frames, size, edges, prior)
+        rays = Rays.of(seen, rings_along(circles, size, *edges.T), outlier)
+        change, normal = _changed(rays, frames, size, edges, prior, usual)
         frames = frame.moved(frames, change[:, :7])
         narrow, (shift, blur, sharpening) = family.narrow * size, edges.T
         most, softest = MAXIMUM_SHIFT * narrow, np.maximum(_SOFTEST * narrow, _SHARPEST)
@@ -165,7 +166,7 @@ def _aligned(
         edges = np.stack([shift, blur, sharpening], axis=1)
     covariance = frame.centre_covariance(frames, np.linalg.inv(normal)[:, :2, :2])
     seen = lit(gray, frames, lights, count)
-    rays = Rays.of(seen, rings_along(family, ids, frame.mean_radii(frames), *edges.T))
+    rays = Rays.of(seen, rings_along(circles, frame.mean_radii(frames), *edges.T))
     return _described(seen, rays, frames, ids, edges, covariance, family.narrow, prior)
 
 
@@ -175,15 +176,18 @@ def _changed(
     size: np.ndarray,
     edges: np.ndarray,
     prior: Prior,
+    usual: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the changes of frames and edges, (k, 10), that rays ask for, and normal matrices."""
+    """Return the changes of frames and edges, (k, 10), that rays ask for, and normal matrices.
+
+    The inverse covariances of the usual perspective have the shape (k, 2, 2).
+    """
     area = size**2 * (PROFILE[1] - PROFILE[0]) * 2 * np.pi
     # Pixels are independent.
     each = np.minimum(area / rays.step.shape[1], 1.0) / _OF_VARIANCE
     each /= rays.variance + _LEAST_VARIANCE
     normal, right = rays.normal * each[:, None, None], rays.right * each[:, None]
     normal[:, range(5), range(5)] += 1e-6
-    usual = usual_perspective(frames)
     normal[:, 5:7, 5:7] += usual
     right[:, 5:7] -= (usual @ frames[:, 2, :2, None])[..., 0]
     known = np.array(prior.deviations) ** -2

@@ -188,12 +188,16 @@ def _first_lights(gray: np.ndarray, frames: Sequence[np.ndarray]) -> list[Lights
     make do so.
     """
     first = [it[:_IN_A_ROW] for it in frames]
-    every, kinds = np.concatenate(first), np.repeat(np.arange(len(first)), [*map(len, first)])
+    # Kinds often share frames.
+    every, back = np.unique(np.concatenate(first).reshape(-1, 9), axis=0, return_inverse=True)
+    every = every.reshape(-1, 3, 3)
     some = np.flatnonzero(shares_alike(gray, every) >= _ALIKE)
     lights = Lights.about(gray, every[some], 1)
     same = show_the_same(gray, lights)
-    lights, kinds = lights.select(same), kinds[some[same]]
-    return [lights.select(kinds == kind) for kind in range(len(first))]
+    lights, row = lights.select(same), np.full(len(every), -1)
+    row[some[same]] = np.arange(len(lights.frames))
+    rows = np.split(row[back.ravel()], np.cumsum([*map(len, first[:-1])]))
+    return [lights.select(of[of >= 0]) for of in rows]
 
 
 def _identified(gray: np.ndarray, look: _Look) -> tuple[Aligned, np.ndarray]:

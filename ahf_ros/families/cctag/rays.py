@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import cv2
 import numpy as np
@@ -65,14 +66,19 @@ class Rays:
         `outlier` usual deviations leaves a quarter. The contrast of ink is the same wherever the
         light falls. What another paper and ink of a ray would explain is left to these.
         """
-        angles = ray_angles(seen.values.shape[1])
-        around = frame.displacement_basis(angles, np.ones_like(angles))
+        around = _around(seen.values.shape[1])
         rounds = _ROUNDS if outlier < math.inf else 0
         found = kernels.cctag_rays(
             *(seen.values, seen.highest, seen.mixed, seen.apart, *inks, ALONG, around, rounds),
             *(outlier, _OTHER_CONTRAST, _QUIET, NORMAL, _LEAST, _ROUNDS_OF_CLIPPED, _LEAST_GAIN),
         )
         return Rays(*found[:8])
+
+
+@lru_cache
+def _around(rays: int) -> np.ndarray:
+    """Return how far each change of a frame moves a circle on so many rays, (rays, 7)."""
+    return frame.displacement_basis(ray_angles(rays), np.ones(rays))
 
 
 def ray_angles(rays: int) -> np.ndarray:

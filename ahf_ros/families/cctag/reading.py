@@ -164,9 +164,7 @@ def in_light(
     return light, again, lights
 
 
-def _in_its_light(
-    gray: np.ndarray, rings: Aligned, family: CctagPrint
-) -> tuple[Lights, Aligned]:
+def _in_its_light(gray: np.ndarray, rings: Aligned, family: CctagPrint) -> tuple[Lights, Aligned]:
     lights = Lights.about(gray, rings.frames)
     known = rings.frames, rings.ids, rings.edges, family
     return lights, align(gray, *known, lights=lights)

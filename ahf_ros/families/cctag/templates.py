@@ -147,19 +147,17 @@ def _clipped(inks: np.ndarray, shares: np.ndarray) -> np.ndarray:
 
 
 def rings_along(
-    family: CctagPrint,
-    ids: np.ndarray,
+    circles: np.ndarray,
     size: np.ndarray,
     shift: np.ndarray,
     blur: np.ndarray,
     sharpening: np.ndarray,
 ) -> tuple[np.ndarray, ...]:
-    """Return the ink of IDs along the profile, shape (k, n), and its derivatives.
+    """Return the ink of signed circles (k, c) along the profile, (k, n), and its derivatives.
 
     These are by the radius, in radii of the target, by the shift, px, by ln of the blur and by the
     sharpening.
     """
-    circles = signed_circles(family, ids)
     inks = kernels.cctag_rings(circles, size, shift, blur, sharpening, ALONG, MASK)
     return tuple(inks[:5])
 
