@@ -127,12 +127,13 @@ def align(
     if lights is None:
         lights = Lights.about(gray, frames)
     parts = [slice(start, start + _PART) for start in range(0, len(frames), _PART)]
+    outliers = _OUTLIERS[_IN_PLACE:] if in_place else _OUTLIERS
     return Aligned.joined(
         [NOTHING]
         + [
             _aligned(
-                *(gray, frames[part], ids[part], edges[part]),
-                *(family, prior, lights.select(part), rays, _OUTLIERS[_IN_PLACE * in_place :]),
+                *(gray, frames[part], ids[part], edges[part], family, prior),
+                *(lights.select(part), rays, outliers),
             )
             for part in parts
         ]

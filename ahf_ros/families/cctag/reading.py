@@ -159,9 +159,8 @@ def in_light(
         light, (lights, again) = gray, _in_its_light(gray, some, family)
     more, rest = _in_its_light(light, rings.select(others), family)
     back = np.argsort(order)
-    joined = Aligned.joined([again, rest]), Lights.joined([lights, more])
-    again, lights = (of.select(back) for of in joined)
-    return light, again, lights
+    again = Aligned.joined([again, rest]).select(back)
+    return light, again, Lights.joined([lights, more]).select(back)
 
 
 def _in_its_light(gray: np.ndarray, rings: Aligned, family: CctagPrint) -> tuple[Lights, Aligned]:
