@@ -101,6 +101,11 @@ class Usual:
     noise: tuple[float, float] = (1.0, 0.0)  # variance of black, and its growth by gray values
     misfits: tuple[float, float] = (0.0, math.inf)  # of the logarithm: usual value, deviation
 
+    @property
+    def contrast(self) -> float:
+        """Contrast of ink, 0 before targets tell it."""
+        return float(self.values[2])
+
     def after(self, fits: list[Fit]) -> Usual:
         """Return what fits tell besides."""
         of_print = np.array([of.formed.of_print for of in fits])

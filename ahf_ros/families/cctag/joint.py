@@ -149,7 +149,8 @@ class _Scene:
             own, light = rings.select(only), lights.select(only)
             patch = Patch.about(self.gray, own, circles, light, self.gamma, most_shift)
             if len(patch.seen) > _FEWEST:
-                yield row, fitted(patch, patch.first(own, light), self.usual)
+                formed = patch.first(own, light, self.usual.contrast)
+                yield row, fitted(patch, formed, self.usual)
 
     def placed(self, rings: Aligned, fit: Fit) -> Aligned:
         """Return the rings of a target, (1,), where a good fit is."""

@@ -152,8 +152,8 @@ class Patch:
         place = frame.translated(formed.frame[None], *-self.corner)[0]
         return self.known, *of_light, self.gamma, self.sharpening, MASK, place, formed.values
 
-    def first(self, rings: Aligned, light: Lights) -> Formed:
-        """Return what forms the pixels as rays tell it."""
+    def first(self, rings: Aligned, light: Lights, contrast: float = 0.0) -> Formed:
+        """Return what forms the pixels as rays tell it; the contrast is 0 if it is not known."""
         blur = math.sqrt(max(float(rings.blur[0]) ** 2 - OF_INTERPOLATION, _SHARPEST**2))
         heights = light.heights[0, 2:]
         edges = light.edges[0, heights != 0]
@@ -161,9 +161,11 @@ class Patch:
         size = self.light_size
         wide = usual_widths(np.array(size)) * np.exp(edges[:, _WIDTH]) * size
         edges[:, _WIDTH] = np.log(np.sqrt(np.maximum(wide**2 - blur**2, _SHARP**2)) / size)
-        of_print = [float(rings.shift[0]), math.log(blur), 0.0]
+        of_print = [float(rings.shift[0]), math.log(blur), contrast]
         values = np.concatenate([of_print, light.heights[0, :2], edges.ravel()])
         formed = Formed(rings.frames[0], values)
+        if contrast:
+            return formed
         linear = replace(self, gamma=1.0, sharpening=0.0)
         bright, changes = kernels.cctag_pixels(*linear.formed(formed), n=len(self.seen))[:2]
         both = np.stack([bright, changes[:, _FRAME + _CONTRAST]])

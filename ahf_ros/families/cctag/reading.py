@@ -34,7 +34,7 @@ def likely_lights(gray: np.ndarray, frames: np.ndarray, most: int = EDGES) -> Li
 
 def show_the_same(gray: np.ndarray, lights: Lights) -> np.ndarray:
     """Return whether most of what rays show in a light is the same on all of them, shape (k,)."""
-    values = lit(gray, lights.moved, lights).values
+    values = lit(gray, lights.moved, lights, FEW_RAYS).values
     means, rays = less_lines(values.mean(axis=1)), less_lines(values)
     return np.asarray((means**2).sum(axis=1) >= _SHARED * (rays**2).sum(axis=2).mean(axis=1))
 
@@ -46,10 +46,12 @@ def identify(
     family: CctagPrint,
     prior: Prior = USUAL,
     most: int = EDGES,
+    settled: bool = True,
 ) -> Aligned:
     """Return the best reading of each target about outermost circles, edges to about a tenth.
 
     The light about them has so many edges at the most, also where their place is better known.
+    Places that another look will improve need not be settled.
     """
     likely = likely_ids(gray, lights, polarity, family, prior)
     likely, lights = likely.select(likely.rings), lights.select(likely.rings)
@@ -73,7 +75,9 @@ def identify(
     likely, lights = likely.select(possible), lights.select(possible)
     best = _likeliest(gray, first.select(possible), likely, lights, polarity, family, prior)
     possible = (best.of_target > _UNLIKELY) & (best.colour == polarity)
-    best = _settled(gray, best.select(possible), family, prior, lights.select(possible))
+    best, lights = best.select(possible), lights.select(possible)
+    if settled:
+        best = _settled(gray, best, family, prior, lights)
     return best.select(best.colour == polarity)
 
 
