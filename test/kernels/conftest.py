@@ -1,14 +1,59 @@
-"""With `--emulated COMMAND`, every call of a kernel is made on another machine as well."""
+"""What is done with every call of a kernel in these tests.
+
+Some are made again with any values: they end, and under `make test-sanitized` no index leaves an
+array. With `--emulated COMMAND`, all are made on another machine as well.
+"""
 
 import shlex
 from collections import Counter
 from collections.abc import Iterator
+from typing import Any
+from unittest import mock
 
+import numpy as np
 import pytest
 
+from ahf_ros.kernels import Kernel
 from support import emulated
 
 CALLS: Counter[str] = Counter()
+HOSTILE = 12
+"""Calls of a kernel in a module that are made again with any values."""
+_FLOATS = np.array([np.nan, np.inf, -np.inf, 0.0, -0.0, -1.0, 0.5, 255.0, 1e-30, 1e9, -1e19, 3e38])
+_BITS = np.array([-62, -31, -8, -1, 0, 1, 8, 31, 62])
+
+
+def hostile(array: np.ndarray, generator: np.random.Generator) -> np.ndarray:
+    """Return an array with any values, in few places or in all of them."""
+    if array.dtype.kind == 'f':
+        values = generator.choice(_FLOATS, array.shape).astype(array.dtype)
+    else:
+        bits = generator.choice(_BITS, array.shape)
+        values = (np.sign(bits) << np.abs(bits)).astype(array.dtype)
+    return np.where(
+        generator.random(array.shape) < generator.choice([0.02, 0.3, 1]), values, array
+    )
+
+
+@pytest.fixture(scope='module', autouse=True)
+def any_values() -> Iterator[None]:
+    called, calls, generator = Kernel.__call__, Counter[str](), np.random.default_rng(0)
+
+    def call(kernel: Kernel, *values: Any, **counts: int) -> Any:
+        results = called(kernel, *values, **counts)
+        calls[kernel.name] += 1
+        for share in (0.2, 0.5, 1) if calls[kernel.name] <= HOSTILE else ():
+            changed = [
+                hostile(np.asarray(value, each.dtype), generator)
+                if each.sides and generator.random() < share
+                else value
+                for each, value in zip(kernel._plan[0], values, strict=True)
+            ]
+            called(kernel, *changed, **counts)
+        return results
+
+    with mock.patch.object(Kernel, '__call__', call):
+        yield
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

@@ -86,8 +86,11 @@ def imported(library: Path) -> subprocess.CompletedProcess[str]:
 def test_a_library_that_is_missing_or_of_another_machine_is_named(tmp_path: Path) -> None:
     missing = imported(tmp_path / 'none.so').stderr.splitlines()[-1]
     assert 'none.so does not exist: the kernels of ahf_ros are not compiled; pip' in missing
-    other = tmp_path / 'other.so'
-    other.write_bytes(bytes(20) + kernels.LIBRARY.read_bytes()[20:])
+    other, library = tmp_path / 'other.so', kernels.LIBRARY.read_bytes()
+    other.write_bytes(bytes(20) + library[20:])
+    assert 'was compiled for another machine or is damaged' in imported(other).stderr
+    machine = b'\x3e\0' if library[18:20] == b'\xb7\0' else b'\xb7\0'  # x86-64 or aarch64
+    other.write_bytes(library[:18] + machine + library[20:])
     assert 'was compiled for another machine or is damaged' in imported(other).stderr
 
 

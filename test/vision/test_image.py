@@ -28,6 +28,7 @@ def test_every_accepted_type_passes_in_any_order_read_only_and_in_the_smallest_s
         (np.zeros((0, 0), np.uint8), '0 x 0 px'),
         (np.zeros((0, 100), np.uint8), '100 x 0 px'),
         (np.zeros((1, 1), np.uint8), '1 x 1 px'),
+        (RAMP[:1].astype(np.uint8), '30 x 1 px'),
         (RAMP[:15].astype(np.uint8), '30 x 15 px'),
         (np.zeros((20, 30, 3), np.uint8), r'shape \(20, 30, 3\)'),
         (np.zeros(100, np.uint8), r'shape \(100,\)'),
