@@ -3,6 +3,7 @@
 import ast
 import importlib.util
 import json
+import os
 import re
 import shutil
 import subprocess
@@ -17,6 +18,7 @@ import cv2
 import pytest
 
 from ahf_ros.nodes.start import NODES
+from ahf_ros.scenes.scene import SceneSettings, render
 from support import ROOT
 from support.command_line import python
 
@@ -78,6 +80,29 @@ def test_everything_but_the_nodes_works_without_ros() -> None:
     names += [f'ahf_ros.nodes.{name}' for name in ('settings', 'drivers', 'interfaces')]
     done = python('-c', WITHOUT_ROS + IMPORT, *names)
     assert done.returncode == 0, done.stderr
+
+
+def test_nothing_is_written_where_it_is_installed(tmp_path: Path) -> None:
+    package, image = tmp_path / 'installed' / 'ahf_ros', tmp_path / 'image.png'
+    shutil.copytree(ROOT / 'ahf_ros', package, ignore=shutil.ignore_patterns('__pycache__'))
+    folders = [package, *(it for it in package.rglob('*') if it.is_dir())]
+    before = {it: it.stat().st_mtime_ns for it in package.rglob('*')}
+    for folder in folders:
+        folder.chmod(0o555)  # root may write even so
+    scene = SceneSettings(width=320, height=240, targets=3, dot_radius=8.0)
+    cv2.imwrite(str(image), render(scene).image)
+    path = os.pathsep.join([str(package.parent), os.environ.get('PYTHONPATH', '')])
+    done = subprocess.run(
+        [sys.executable, '-B', '-m', 'ahf_ros.cli', 'identify', str(image), '--json'],
+        env={**os.environ, 'PYTHONPATH': path},
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+    )
+    for folder in folders:
+        folder.chmod(0o755)
+    assert (done.returncode, len(json.loads(done.stdout)['targets'])) == (0, 3), done.stderr
+    assert before == {it: it.stat().st_mtime_ns for it in package.rglob('*')}
 
 
 @needs_rosbags

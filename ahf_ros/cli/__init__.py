@@ -31,10 +31,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except BrokenPipeError:
         # Without this, the interpreter reports an error when it flushes the closed pipe.
         _discard_output()
-    except ModuleNotFoundError as error:
-        if error.name not in ('cv2', 'numpy'):
+    except ImportError as error:
+        if error.name not in ('cv2', 'numpy', 'ahf_ros.kernels'):
             raise
-        print(f'ahf: error: {error.name} is missing, see ahf doctor', file=sys.stderr)
+        missing = isinstance(error, ModuleNotFoundError)
+        text = f'{error.name} is missing, see ahf doctor' if missing else error
+        print(f'ahf: error: {text}', file=sys.stderr)
     except OSError as error:  # of standard output: a full disk
         _discard_output()
         print(f'ahf: error: {error.strerror or error}', file=sys.stderr)

@@ -8,6 +8,7 @@ import re
 import subprocess
 import sys
 from collections.abc import Iterator
+from contextlib import suppress
 from importlib import metadata
 
 from ahf_ros.base.extras import EXTRAS, REQUIRED, missing
@@ -129,6 +130,13 @@ def _problems() -> Iterator[str]:
         )
     if not importlib.util.find_spec('cv2'):
         yield 'OpenCV is missing: pip install --force-reinstall --no-deps opencv-python-headless'
+    with suppress(ModuleNotFoundError):
+        from ahf_ros import kernels
+
+        try:
+            kernels.exponentials([0.0])
+        except ImportError as error:
+            yield str(error)
     sourced = os.environ.get('ROS_DISTRO')
     wheels = _version('ahf-ros-interfaces')
     if sourced and wheels and os.environ.get('AMENT_PREFIX_PATH'):

@@ -217,14 +217,16 @@ def _library() -> ctypes.CDLL:
     if not path.exists():
         raise ImportError(
             f'{path} does not exist: the kernels of ahf_ros are not compiled; pip install . or '
-            'python scripts/build_kernels.py compiles them'
+            'python scripts/build_kernels.py compiles them',
+            name=__name__,
         )
     try:
         return ctypes.CDLL(str(path))
     except OSError as error:
         raise ImportError(
             f'{path} was compiled for another machine or is damaged ({error}); pip install . or '
-            'python scripts/build_kernels.py compiles it for this one'
+            'python scripts/build_kernels.py compiles it for this one',
+            name=__name__,
         ) from error
 
 

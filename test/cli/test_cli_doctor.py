@@ -7,8 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from ahf_ros import kernels
 from ahf_ros.base.extras import EXTRAS
 from ahf_ros.cli import doctor
+from support import ROOT
 from support.command_line import ahf, python, status
 
 EXTRA = ('rclpy', 'asyncio', 'dask', 'distributed', 'jinja2', 'rosbags', 'mcap', 'scipy')
@@ -58,6 +60,20 @@ def test_a_missing_opencv_is_said_in_one_line() -> None:
     )
     done = python('-c', program, 'identify', 'a.png')
     assert (done.returncode, done.stderr) == (1, 'ahf: error: cv2 is missing, see ahf doctor\n')
+
+
+@pytest.mark.parametrize('command', [('identify', ROOT / 'docs/pictures/report.jpg'), ('doctor',)])
+def test_kernels_that_are_not_of_this_machine_are_said_in_one_line(
+    command: tuple[object, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv(kernels.VARIABLE, str(tmp_path / 'kernels.bin'))
+    for content, said in ((None, 'does not exist'), (b'MZ', 'compiled for another machine')):
+        if content:
+            (tmp_path / 'kernels.bin').write_bytes(content)
+        done = ahf(*command)
+        assert (done.returncode, 'Traceback' in done.stderr) == (1, False)
+        last = (done.stderr or done.stdout).splitlines()[-1]
+        assert said in last and 'pip install . or python scripts/build_kernels.py' in last
 
 
 def is_installed(name: str) -> bool:
