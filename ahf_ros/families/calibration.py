@@ -25,7 +25,7 @@ import numpy as np
 from ahf_ros.base.target import Target, UndecodedTarget
 from ahf_ros.vision.logistic import log_odds, probability, read_weights
 
-KINDS = ('gsi', 'dots')
+KINDS = ('dots',)
 """Kinds of detectors that are surer than they are right; others are at most as sure."""
 
 KNOTS = np.array([0.02, 0.5, 0.95, 0.99])

@@ -36,6 +36,23 @@ def rough_image(seed: int) -> np.ndarray:
     return (40 + 200 * image / image.max()).astype(np.uint8)
 
 
+def text_page(seed: int) -> np.ndarray:
+    """Return a page of print, 1600 x 1200 px, line upon line, many of whose letters are round."""
+    generator = np.random.default_rng(seed)
+    page = np.full((1200, 1600), 235, np.uint8)
+    font = int(generator.choice([cv2.FONT_HERSHEY_SIMPLEX, cv2.FONT_HERSHEY_COMPLEX]))
+    scale, weight = float(generator.uniform(0.5, 1.2)), int(generator.integers(1, 3))
+    letters = list('aabcddeeghmnooooprstu' + ' ' * 4 + 'OOQ0068')
+    height = cv2.getTextSize('og', font, scale, weight)[0][1]
+    bottom = 2 * height
+    while bottom < len(page):
+        line = ''.join(generator.choice(letters, 300))
+        cv2.putText(page, line, (4, bottom), font, scale, 30, weight, cv2.LINE_AA)
+        bottom += round(height * generator.uniform(1.3, 1.7)) + 4
+    blurred = cv2.GaussianBlur(page, (0, 0), generator.uniform(0.4, 1.2))
+    return _clipped(blurred + generator.normal(0, 2, page.shape))
+
+
 def dot_grid(seed: int) -> np.ndarray:
     """Return an image of a regular grid of 2,000 dots, slightly turned and foreshortened."""
     generator = np.random.default_rng(seed)

@@ -35,6 +35,6 @@ def test_the_likely_id_of_an_undecoded_target_has_its_probability_and_no_id_none
     target = Target(7, 71, 1.0, 2.0, 3.0, 3.0, confidence=0.5)
     uncertain = undecoded(target)
     unread = undecoded(replace(target, confidence=0.01))
-    likely, unlikely = stated([uncertain, unread], 'gsi')
-    assert likely == replace(uncertain, confidence=states(np.array([0.5]), 'gsi')[0])
+    likely, unlikely = stated([uncertain, unread], 'dots')
+    assert likely == replace(uncertain, confidence=states(np.array([0.5]), 'dots')[0])
     assert unlikely == unread

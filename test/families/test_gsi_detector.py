@@ -15,6 +15,7 @@ from ahf_ros.scenes.scene import Rendering
 from ahf_ros.views.drawing.overlay import DECODED_COLOUR, DECODING_DOT_COLOUR, draw
 from ahf_ros.vision.homography import fit_homographies
 from ahf_ros.vision.pyramid import image_pyramid
+from support.pictures.textures import text_page
 from support.scenes import around, counted, errors, relative_errors, rendering
 
 SIZE = {'family': 'gsi', 'width': 1000, 'height': 700, 'targets': 4, 'dot_radius': 6.0, 'seed': 3}
@@ -23,6 +24,12 @@ detect = create_detector(family='gsi')
 
 def scene(**changes: object) -> Rendering:
     return rendering(**SIZE | changes)
+
+
+@pytest.mark.lasting
+@pytest.mark.parametrize('seed', [101, 102, 103])
+def test_letters_are_no_dots(seed: int) -> None:
+    assert detect(text_page(seed)) == []
 
 
 @pytest.mark.lasting

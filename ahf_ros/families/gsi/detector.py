@@ -18,7 +18,6 @@ import numpy as np
 
 from ahf_ros.base.blas import one_blas_thread
 from ahf_ros.base.target import UNDECODED, DottedTarget, Target, sorted_targets
-from ahf_ros.families.calibration import stated
 from ahf_ros.families.contract import DetectorSettings, moved_targets
 from ahf_ros.families.gsi.evidence import find_evidence, likely_templates, read_codes
 from ahf_ros.families.gsi.grouping import FEW, Templates, find_templates
@@ -80,7 +79,7 @@ class GsiDetector(PyramidDetector):
         single = [target for target in found if target.id == UNDECODED]
         coded = [target for target in found if target.id != UNDECODED]
         reach = SAME * self.design.reach / float(self.design.template_radii[self.design.reference])
-        coded = stated(self.reported(coded, reach, CERTAIN), self.name)
+        coded = self.reported(coded, reach, CERTAIN)
         return sorted_targets([*coded, *map(undecoded, single)])
 
     def _identify(self, octave: Octave) -> list[Target]:

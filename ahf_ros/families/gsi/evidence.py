@@ -264,14 +264,11 @@ class Readings:
     support : ndarray of float64, shape (k,)
         Evidence for a target with this code: for its dots, and against dots at all other places,
         as a share of the most there may be.
-    weakest : ndarray of float64, shape (k,)
-        The second lowest evidence for one of its dots, as light may hide one.
     """
 
     words: np.ndarray
     margin: np.ndarray
     support: np.ndarray
-    weakest: np.ndarray
 
 
 def read_codes(
@@ -297,7 +294,6 @@ def read_codes(
     margin = np.minimum(margins(each, scores, best), _GREATEST_MARGIN)
     marked = incidence[best] > 0
     empty = ~marked & ~_covered(marked, scale, family)
-    of_dots = np.concatenate([template, np.where(marked, positions, _MAXIMUM_FOR)], axis=1)
     empty_places = np.where(empty, -positions, 0.0).sum(axis=1)
     dots = template.sum(axis=1) + np.where(marked, positions, 0.0).sum(axis=1)
     empty &= evidence.inside[:, count:]
@@ -306,7 +302,6 @@ def read_codes(
         words=family.words[best],
         margin=margin,
         support=(dots + empty_places) / most,
-        weakest=np.sort(of_dots, axis=1)[:, 1],
     )
 
 

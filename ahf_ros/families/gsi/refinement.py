@@ -22,6 +22,7 @@ from ahf_ros.vision.sampling import sample_circles
 _RAYS = 32  # about a dot
 _SIZES, _REACHES = np.array([0.5, 1.1, 2.3]), np.array([1.9, 0.95, 0.45])
 # Semi-minor axis of a dot, px, from where on its edge is looked for within a reach, dot radii.
+_CLEAR = 1.5  # semi-minor axis of a dot, px, from which its edge is found in nearly any light
 _UNMEASURED = 0.3  # standard deviation of a centre whose edge was not fitted, px
 _OUTLIER = 4.0  # standard deviations from which a dot loses its weight
 _USUAL = (0.08, 0.004)  # distance of a dot from the homography, px and dot radii
@@ -42,6 +43,8 @@ class Placement:
         Of the image of the reference point, px^2.
     share : ndarray of float64, shape (k,)
         Share of the dots whose edges were found where they should be.
+    missing : ndarray of float64, shape (k,)
+        Share of the dots whose edges were not, of those large enough for that; 0 without such.
     misplacement : ndarray of float64, shape (k,)
         Sum of ln(1 + (d / s)^2) over the dots but the worst, with the distance d of a dot from
         the homography and the usual one, s.
@@ -56,6 +59,7 @@ class Placement:
     homographies: np.ndarray
     covariance: np.ndarray
     share: np.ndarray
+    missing: np.ndarray
     misplacement: np.ndarray
     scale: np.ndarray
     unevenness: np.ndarray
@@ -156,6 +160,7 @@ def place_targets(
     centres = np.where(near[..., None], fitted, frames[..., :2, 2])
     weights = np.linalg.inv(dots.covariance).reshape(*shape, 2, 2)
     robust = weights
+    clear = ellipse_axes(frames.reshape(-1, 3, 3))[1].reshape(shape) >= _CLEAR
     size = np.log(mean_radii(dots.frames)).reshape(shape)
     measured = found | ~found.any(axis=1, keepdims=True)
     shift = np.zeros((*shape, 2))
@@ -183,6 +188,7 @@ def place_targets(
         homographies=fit.homographies,
         covariance=fit.covariance * excess[:, None, None],
         share=near.mean(axis=1),
+        missing=(clear & ~near).sum(axis=1) / np.maximum(clear.sum(axis=1), 1),
         misplacement=misplaced.sum(axis=1),
         scale=scale,
         unevenness=uneven,
