@@ -19,6 +19,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from ahf_ros.families import create_detector
 from ahf_ros.files.image_files import read_image
 from ahf_ros.scenes.evaluation import score
@@ -28,7 +30,7 @@ from benchmarks.report import number, table
 from benchmarks.rows import Case, Row, Scene, detector, measured, rendered
 from benchmarks.speed import in_turns
 from support import PHOTOS
-from support.pictures.textures import dot_grid, rough_image
+from support.pictures.textures import dot_grid, rough_image, text_page
 
 PAPER = SceneSettings(
     family='gsi',
@@ -66,13 +68,15 @@ def without_targets() -> Iterator[Case]:
         yield rendered('no targets', f'{light} 0.3', scene)
     yield rendered('no targets', '100 distractors', replace(LARGE, targets=0, distractors=100))
     for count in range(10):
-        yield case(f'texture {count}', partial(_rough, count))
+        yield case(f'texture {count}', partial(_drawn, rough_image, count))
+    for count in range(4):
+        yield case(f'page of print {count}', partial(_drawn, text_page, count))
     for path in sorted((PHOTOS / 'panel').glob('*.png')):
         yield case(f'photograph {path.stem}', partial(_photograph, path))
 
 
-def _rough(count: int, seed: int) -> Scene:
-    return rough_image(100 * seed + count), ()
+def _drawn(draw: Callable[[int], np.ndarray], count: int, seed: int) -> Scene:
+    return draw(100 * seed + count), ()
 
 
 def _photograph(path: Path, _: int) -> Scene:
