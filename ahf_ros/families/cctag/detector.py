@@ -246,7 +246,7 @@ def _first_readings(gray: np.ndarray, look: _Look) -> tuple[Aligned, int]:
     Those that are most like rings come first, and with them the targets. Where none of so many in
     a row may be one, the others are texture.
     """
-    kind = look.polarity, look.family, look.prior, 1, False
+    kind = look.polarity, look.family, look.prior, 1
     found, count = [identify(gray, look.lights, *kind)], _IN_A_ROW
     while (found[-1].of_target >= _POSSIBLE).any() and count < len(look.frames):
         some = look.frames[count : count + _IN_A_ROW]

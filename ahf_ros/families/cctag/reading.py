@@ -46,12 +46,10 @@ def identify(
     family: CctagPrint,
     prior: Prior = USUAL,
     most: int = EDGES,
-    settled: bool = True,
 ) -> Aligned:
     """Return the best reading of each target about outermost circles, edges to about a tenth.
 
     The light about them has so many edges at the most, also where their place is better known.
-    Places that another look will improve need not be settled.
     """
     likely = likely_ids(gray, lights, polarity, family, prior)
     likely, lights = likely.select(likely.rings), lights.select(likely.rings)
@@ -75,9 +73,7 @@ def identify(
     likely, lights = likely.select(possible), lights.select(possible)
     best = _likeliest(gray, first.select(possible), likely, lights, polarity, family, prior)
     possible = (best.of_target > _UNLIKELY) & (best.colour == polarity)
-    best, lights = best.select(possible), lights.select(possible)
-    if settled:
-        best = _settled(gray, best, family, prior, lights)
+    best = _settled(gray, best.select(possible), family, prior, lights.select(possible))
     return best.select(best.colour == polarity)
 
 
