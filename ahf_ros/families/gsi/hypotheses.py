@@ -22,8 +22,8 @@ from ahf_ros.vision.homography import reference_frames
 from ahf_ros.vision.logistic import logistic, read_weights
 
 WEIGHTS = Path(__file__).with_name('fitted_weights.json')
-CERTAIN = 0.8  # confidence from which a target is reported
-OBVIOUS = 0.96  # confidence from which a target is not weighed against others in its place
+CERTAIN = 0.7  # confidence from which a target is reported
+OBVIOUS = 0.95  # confidence from which a target is not weighed against others in its place
 POSSIBLE = 0.1  # confidence from which a target is reported without its ID, where these are
 SAME = 0.4  # distance of the reference points of the same target in its reach
 
@@ -97,9 +97,10 @@ def confidence_features(
 ) -> np.ndarray:
     """Return what tells targets from chance arrangements, and right codes from wrong ones.
 
-    Support and margin of the reading at the places of the placement; the misplacement; the
-    differences of the radii of dots, and the perspective, both up to a bound; and the share of the
-    dots of some size whose edges are not where they should be, shape (k, 6).
+    Support and margin of the reading at the places of the placement; the roots of the
+    misplacement, of the differences of the radii of dots, up to a bound, and of the share of the
+    dots of some size whose edges are not where they should be, as the first of these says most;
+    and the perspective, up to a bound, shape (k, 6).
     """
     radius = float(family.template_radii[family.reference])
     minor = ellipse_axes(reference_frames(placement.homographies, radius))[1] * placement.scale
@@ -110,10 +111,10 @@ def confidence_features(
         [
             readings.support,
             readings.margin,
-            placement.misplacement,
-            np.minimum(uneven, _MAXIMUM),
+            np.sqrt(placement.misplacement),
+            np.sqrt(np.minimum(uneven, _MAXIMUM)),
+            np.sqrt(placement.missing),
             np.minimum(np.hypot(*perspective.T), _MAXIMUM),
-            placement.missing,
         ],
         axis=1,
     )
