@@ -97,7 +97,7 @@ def run(options: argparse.Namespace) -> int:
     jobs = min(options.jobs, len(tasks))
     columns = TextColumn('{task.description}'), BarColumn(), MofNCompleteColumn()
     failed = False
-    with progress_bar(True, *columns, TimeRemainingColumn()) as progress:
+    with progress_bar(*columns, TimeRemainingColumn()) as progress:
         bars = [progress.add_task(task.source.name, total=None) for task in tasks]
 
         def report(number: int, done: int, total: int, remark: str) -> None:

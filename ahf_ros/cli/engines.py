@@ -75,11 +75,11 @@ def tracker(
     if not (shown and sys.stderr.isatty()):  # nor is what draws bars imported
         yield iter
         return
-    with progress_bar(shown) as progress:
+    with progress_bar() as progress:
         yield partial(progress.track, total=total, description=description)
 
 
-def progress_bar(shown: bool, *columns: ProgressColumn) -> Progress:
+def progress_bar(*columns: ProgressColumn) -> Progress:
     """Return a bar on standard error that is gone when all is done; it needs a terminal."""
     from rich.console import Console
     from rich.progress import Progress
@@ -90,5 +90,5 @@ def progress_bar(shown: bool, *columns: ProgressColumn) -> Progress:
         console=Console(stderr=True),
         transient=True,
         redirect_stdout=False,
-        disable=not (shown and sys.stderr.isatty()),
+        disable=not sys.stderr.isatty(),
     )
