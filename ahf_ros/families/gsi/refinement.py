@@ -80,6 +80,8 @@ class MeasuredDots:
         Whether there is an edge.
     near : ndarray of bool, shape (n,)
         Whether it is about where it should be.
+    clear : ndarray of bool, shape (n,)
+        Whether the dot is so large that an edge is found in nearly any light.
     growth : ndarray of float64, shape (n,)
         Of what is dark in light, where there is an edge, if in gray values there was none, px.
     """
@@ -88,6 +90,7 @@ class MeasuredDots:
     covariance: np.ndarray
     found: np.ndarray
     near: np.ndarray
+    clear: np.ndarray
     growth: np.ndarray
 
 
@@ -109,7 +112,12 @@ def measure_dots(gray: np.ndarray, frames: np.ndarray, polarity: np.ndarray) -> 
     near[which] = good
     covariance[which[good]] = fit.covariance[good]
     return MeasuredDots(
-        frames=fitted, covariance=covariance, found=found, near=near, growth=growth
+        frames=fitted,
+        covariance=covariance,
+        found=found,
+        near=near,
+        clear=minor >= _CLEAR,
+        growth=growth,
     )
 
 
@@ -155,12 +163,11 @@ def place_targets(
     shape = frames.shape[:2]
     signs = np.repeat(polarity, shape[1])
     dots = measure_dots(gray, frames.reshape(-1, 3, 3), signs)
-    near, found = dots.near.reshape(shape), dots.found.reshape(shape)
+    near, found, clear = (it.reshape(shape) for it in (dots.near, dots.found, dots.clear))
     fitted = dots.frames[:, :2, 2].reshape(*shape, 2)
     centres = np.where(near[..., None], fitted, frames[..., :2, 2])
     weights = np.linalg.inv(dots.covariance).reshape(*shape, 2, 2)
     robust = weights
-    clear = ellipse_axes(frames.reshape(-1, 3, 3))[1].reshape(shape) >= _CLEAR
     size = np.log(mean_radii(dots.frames)).reshape(shape)
     measured = found | ~found.any(axis=1, keepdims=True)
     shift = np.zeros((*shape, 2))
