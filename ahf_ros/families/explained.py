@@ -8,16 +8,13 @@ from math import hypot
 import numpy as np
 
 from ahf_ros.base.target import DottedTarget, Prints, Target, reach_of
+from ahf_ros.families.contract import Part
 from ahf_ros.vision.frame import affine_frames
 
 MARGIN = 1.15
 """Times the reach of a target, within which the blur of its edges is."""
 
 _ANGLES = 64  # in which the surroundings of a target are looked at
-
-
-Part = tuple[slice, slice]
-"""Rows and columns of a part of an image, each with its start and its end."""
 
 
 def without_targets(
@@ -31,8 +28,8 @@ def without_targets(
     targets : iterable of Target
     prints : mapping of str to FamilyRecord
         Their families by name; a target of another one ends with its ellipse.
-    part : tuple of 2 slice, optional
-        Part of the image that is returned.
+    part : tuple of 4 int, optional
+        Part of the image that is returned, see `ahf_ros.families.contract.Part`.
 
     Returns
     -------
@@ -51,8 +48,8 @@ def without_targets(
     (3, 0)
     """
     height, width = image.shape
-    rows, columns = part or (slice(0, height), slice(0, width))
-    left = image[rows, columns].copy()
+    x0, y0, x1, y1 = part or (0, 0, width, height)
+    left = image[y0:y1, x0:x1].copy()
     angles = np.arange(_ANGLES) * 2 * np.pi / _ANGLES
     ellipses = np.array([(it.x, it.y, *_reach(it, prints)) for it in targets]).reshape(-1, 5)
     frames = affine_frames(*ellipses.T)
@@ -60,8 +57,9 @@ def without_targets(
     rims = np.rint((frames @ circle)[:, :2]).astype(int)
     x, y = rims.swapaxes(0, 1)
     every = image[y.clip(0, height - 1), x.clip(0, width - 1)].astype(float)
-    start, stop = (columns.start, rows.start), (columns.stop, rows.stop)
-    low, high = (it.clip(start, stop).tolist() for it in (rims.min(axis=2), rims.max(axis=2) + 1))
+    low, high = (
+        it.clip((x0, y0), (x1, y1)).tolist() for it in (rims.min(axis=2), rims.max(axis=2) + 1)
+    )
     of_targets = low, high, every, np.median(every, axis=1), np.linalg.inv(frames)
     for (first, top), (end, bottom), about, middle, inverse in zip(*of_targets, strict=True):
         if first == end or top == bottom:
@@ -76,7 +74,7 @@ def without_targets(
         rim_values = np.interp(turn, angles, about, period=2 * np.pi)
         painted = middle + outwards[inside] * (rim_values - middle)
         painted = painted if image.dtype.kind == 'f' else np.rint(painted)
-        of_target = left[top - start[1] : bottom - start[1], first - start[0] : end - start[0]]
+        of_target = left[top - y0 : bottom - y0, first - x0 : end - x0]
         of_target[inside] = painted
     return left
 

@@ -23,8 +23,9 @@ from ahf_ros.base.deprecation import deprecated_arguments
 from ahf_ros.base.notices import said_once
 from ahf_ros.base.target import UNDECODED, Identification, Target, UndecodedTarget
 from ahf_ros.base.target_check import checked_targets
+from ahf_ros.families.contract import Part
 from ahf_ros.families.evidence import Reading, evidence, is_clear, reading_of
-from ahf_ros.families.explained import Part, without_targets
+from ahf_ros.families.explained import without_targets
 from ahf_ros.families.undecoded import undecoded
 from ahf_ros.identification.filtering.genetic import Values
 from ahf_ros.identification.filtering.identifier import Identifier, Memory
@@ -114,25 +115,29 @@ def _family(target: Target) -> str:
 
 def _parts(shape: tuple[int, int]) -> list[Part]:
     """Return parts of an image, which overlap."""
-    rows, columns = map(_spans, shape)
-    return [(row, column) for row in rows for column in columns]
+    height, width = shape
+    return [
+        (left, top, right, bottom)
+        for top, bottom in _spans(height)
+        for left, right in _spans(width)
+    ]
 
 
 def _reduced(image: np.ndarray, part: Part) -> np.ndarray:
     """Return an image in the size of one of its parts."""
-    scale = min(of.stop / side for of, side in zip(part, image.shape, strict=True))
+    height, width = image.shape
+    scale = min((part[2] - part[0]) / width, (part[3] - part[1]) / height)
     return cv2.resize(image, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
 
 
-def _spans(side: int) -> list[slice]:
-    """Return the parts of a side, px."""
+def _spans(side: int) -> list[tuple[int, int]]:
+    """Return the bounds of the parts of a side, px."""
     length = max(_PART, math.ceil(3 * side / (2 * _PARTS + 1)))
     if side <= length:
-        return [slice(0, side)]
+        return [(0, side)]
     count = math.ceil(1 + 3 * (side - length) / (2 * length))
-    return [
-        slice(start, start + length) for start in np.linspace(0, side - length, count, dtype=int)
-    ]
+    starts = np.linspace(0, side - length, count, dtype=int).tolist()
+    return [(start, start + length) for start in starts]
 
 
 def _beside(
@@ -235,10 +240,12 @@ class SettlingIdentifier(Identifier):
         """
         turn, still = self.memory.glanced, self.memory.seen.still if self.memory.seen else 0
         self.memory = replace(self.memory, glanced=turn + 1)
-        image = stack.combined(found.combination or stack.names[0])
-        known = [it for it in found.targets if it.id != UNDECODED]
-        left = partial(without_targets, image, known, found.prints)
         parts = _parts(stack.shape) if turn >= 0 else []
+
+        def left(part: Part | None = None) -> np.ndarray:
+            image = stack.combined(found.combination or stack.names[0])
+            known = [it for it in found.targets if it.id != UNDECODED]
+            return without_targets(image, known, found.prints, part)
 
         def in_part(part: Part | None = None) -> list[Target]:
             return self._seen(left(part))
