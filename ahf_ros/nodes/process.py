@@ -1,6 +1,7 @@
 """Node start-up and shutdown."""
 
 import ctypes
+import faulthandler
 import os
 import re
 import sys
@@ -38,6 +39,9 @@ LOG_PERIOD = 5.0
 
 MAXIMUM_PARAMETERS = 1000
 """Maximum number of parameters in one call of a service."""
+
+ENDING = 60.0
+"""Time that a node has to end in order, s; then it says where it waits, and ends at once."""
 
 _M_TRIM_THRESHOLD, _M_MMAP_THRESHOLD, _M_ARENA_MAX = -1, -3, -8  # of glibc's malloc.h
 
@@ -198,7 +202,8 @@ def run(make_node: Callable[[], ProcessNode], arguments: list[str] | None = None
     """Run a node until it ends itself or receives one of `ending_signals`, and return its status.
 
     That is 0 after a signal, and 1 if the node cannot start with these arguments, with the reason
-    on stderr. Where there are no arguments, `sys.argv` has them.
+    on stderr. A node that does not end within `ENDING` ends the process with 1 and a traceback of
+    all threads. Where there are no arguments, `sys.argv` has them.
     """
     reuse_memory()
     outlive_others()
@@ -228,10 +233,13 @@ def run(make_node: Callable[[], ProcessNode], arguments: list[str] | None = None
     try:
         executor.spin_until(node.ended)
     finally:
+        # Threads that wait for each other in C++ hold up whatever is written in Python.
+        faulthandler.dump_traceback_later(ENDING, exit=True, file=2)
         node.close()
         executor.shutdown()
         node.destroy_node()
         rclpy.shutdown()
+        faulthandler.cancel_dump_traceback_later()
         ignore_ending()
     return node.ended.result()
 

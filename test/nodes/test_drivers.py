@@ -45,7 +45,7 @@ for name, arguments in every:
 signal.signal(signal.SIGINT, signal.SIG_IGN)
 sys.exit(sum(os.waitstatus_to_exitcode(os.wait()[1]) for _ in every))
 """
-"""Several nodes for the imports of two."""
+"""Several nodes for the imports of two, and no threads of numpy that a fork would leave behind."""
 
 GIVEN = {'registration': 'true', 'family': SCENE.family}
 ARGUMENTS = {'ensenso': {'cloud_offset_x': str(NARROWER)}}
@@ -148,7 +148,7 @@ def nodes() -> Iterator[subprocess.Popen]:
         ).nodes
     ]
     command = (sys.executable, '-c', NODES, json.dumps(started))
-    environment = {**os.environ, **ros_environment()}
+    environment = {**os.environ, **ros_environment(), 'OPENBLAS_NUM_THREADS': '1'}
     process = subprocess.Popen(command, env=environment, start_new_session=True)
     yield process
     os.killpg(process.pid, signal.SIGINT)

@@ -51,6 +51,21 @@ for _ in range(4):
 sys.exit(start('detector', ['--ros-args', '-p', 'expected_targets:=-1']))
 """
 
+WAITING = """
+import os, signal, sys, time
+from ahf_ros.nodes import process, start
+from ahf_ros.nodes.scoreboard import Scoreboard
+
+def wait(self):
+    time.sleep(600)
+
+process.ENDING = 1.0
+Scoreboard.close = wait
+start.signalled()
+os.kill(os.getpid(), signal.SIGINT)
+sys.exit(process.run(Scoreboard))
+"""
+
 
 def run(*command: str, **environment: str) -> tuple[int, str]:
     """Return exit status and error output of a process."""
@@ -97,6 +112,12 @@ def test_threads_that_go_on_in_the_middle_of_a_call_do_not_change_the_status() -
     status, errors = run('-c', GOING_ON)
     assert (status, len(errors.splitlines())) == (1, 1), errors
     assert 'expected_targets' in errors
+
+
+def test_a_node_that_does_not_end_says_where_it_waits() -> None:
+    status, errors = run('-c', WAITING)
+    assert status == 1
+    assert 'in wait\n' in errors
 
 
 def test_a_node_that_has_to_be_secure_and_cannot_be_does_not_run(tmp_path: Path) -> None:
