@@ -169,11 +169,11 @@ void edge_points(count k, count m, const double frames[k][3][3], const double po
                  const double normals[m][2], const double curvature[m], const double spacing[m],
                  double no_length, double images[k][m][2], double outwards[k][m][2],
                  double scale[k][m], double distance[k][m], double bend[k][m]);
-void profile_groups(count k, count m, count w, count b, const double points[k][m][2],
+void profile_groups(count k, count m, count w, const double points[k][m][2],
                     const double normals[k][m][2], const int16_t polarity[k][m],
                     const double scale[k][m], const double reach[k], const double enough[k],
                     const int32_t blurs[k], const double half_widths[w], double right,
-                    double bottom, int32_t groups[k][m], bool used[b][w]);
+                    double bottom, int32_t groups[k][m]);
 void fit_steps(count h, count w, count k, count m, count g, count f, const float gray[h][w],
                const double points[k][m][2], const double normals[k][m][2],
                const int16_t polarity[k][m], const double spacing[k][m],
@@ -181,7 +181,9 @@ void fit_steps(count h, count w, count k, count m, count g, count f, const float
                const double half_widths[g], const int32_t filters[g], const double along[13],
                const float search[f][13][51], const float parts[f][17][13][18],
                const double known[f][3][17], double maximum_aside, double minimum_step,
-               double edges[7][k][m], bool visible[k][m]);
+               double offset[k][m], double dark[k][m], double bright[k][m], double slope[k][m],
+               double sensitivity[k][m], double softness[k][m], double residual[k][m],
+               bool visible[k][m]);
 
 /* edge_fit.c */
 

@@ -39,18 +39,14 @@ void edge_points(count k, count m, const double frames[k][3][3], const double po
 }
 
 /* The group of each profile, its blur times the number of widths plus its width, the longest one
-   that reach and image allow; and which groups there are. Width 0 stands for none. */
-void profile_groups(count k, count m, count w, count b, const double points[k][m][2],
+   that reach and image allow. Width 0 stands for none. */
+void profile_groups(count k, count m, count w, const double points[k][m][2],
                     const double normals[k][m][2], const int16_t polarity[k][m],
                     const double scale[k][m], const double reach[k], const double enough[k],
                     const int32_t blurs[k], const double half_widths[w], double right,
-                    double bottom, int32_t groups[k][m], bool used[b][w])
+                    double bottom, int32_t groups[k][m])
 {
-    for (count blur = 0; blur < b; blur++)
-        for (count width = 0; width < w; width++)
-            used[blur][width] = false;
-    for (count i = 0; i < k; i++) {
-        count blur = within(blurs[i], b);
+    for (count i = 0; i < k; i++)
         for (count j = 0; j < m; j++) {
             double length = reach[i] * scale[i][j];
             length = length < enough[i] ? length : enough[i];
@@ -61,10 +57,8 @@ void profile_groups(count k, count m, count w, count b, const double points[k][m
             double y = points[i][j][1], down = fabs(half_widths[width] * normals[i][j][1]);
             if (!(x - across >= 0 && x + across <= right && y - down >= 0 && y + down <= bottom))
                 width = 0;
-            groups[i][j] = (int32_t)(blur * w + width);
-            used[blur][width] = true;
+            groups[i][j] = (int32_t)within((int64_t)blurs[i] * w + width, INT32_MAX);
         }
-    }
 }
 
 enum { SAMPLES = 13, LINES = 2, OFFSETS = 17, PARTS = 5 };
@@ -103,8 +97,8 @@ static inline void sample_profile(count h, count w, const float gray[h][w], cons
         }
 }
 
-/* The step on each profile, with filters for its group, fitted about the offset that explains most.
-   Fields of edges: offset, dark, bright, slope, sensitivity, softness, residual. */
+/* The step on each profile, with filters for its group, fitted about the offset that explains
+   most. */
 void fit_steps(count h, count w, count k, count m, count g, count f, const float gray[h][w],
                const double points[k][m][2], const double normals[k][m][2],
                const int16_t polarity[k][m], const double spacing[k][m],
@@ -112,7 +106,9 @@ void fit_steps(count h, count w, count k, count m, count g, count f, const float
                const double half_widths[g], const int32_t filters[g], const double along[13],
                const float search[f][13][51], const float parts[f][17][13][18],
                const double known[f][3][17], double maximum_aside, double minimum_step,
-               double edges[7][k][m], bool visible[k][m])
+               double offset[k][m], double dark[k][m], double bright[k][m], double slope[k][m],
+               double sensitivity[k][m], double softness[k][m], double residual[k][m],
+               bool visible[k][m])
 {
     for (count i = 0; i < k; i++)
         for (count j = 0; j < m; j++) {
@@ -121,8 +117,8 @@ void fit_steps(count h, count w, count k, count m, count g, count f, const float
             count filter = filters[group];
             visible[i][j] = half > 0 && filter >= 0 && filter < f;
             if (!visible[i][j]) {
-                for (int field = 0; field < 7; field++)
-                    edges[field][i][j] = 0;
+                offset[i][j] = dark[i][j] = bright[i][j] = slope[i][j] = 0;
+                sensitivity[i][j] = softness[i][j] = residual[i][j] = 0;
                 continue;
             }
             double outwards = polarity[i][j]; /* from dark to bright, or the other way */
@@ -155,12 +151,12 @@ void fit_steps(count h, count w, count k, count m, count g, count f, const float
             double moved = lesser(greater(-fitted[2] / contrast, -reach), reach);
             /* On a curve, the blur and the chord between the two lines lie inside. */
             double inside = (blur[i] * blur[i] + aside * aside) / 2 * curvature[i][j];
-            edges[0][i][j] = outwards * (known[filter][0][best] + moved) + inside;
-            edges[1][i][j] = low;
-            edges[2][i][j] = high;
-            edges[3][i][j] = outwards * (fitted[3] / greater(high, minimum_step));
-            edges[4][i][j] = known[filter][2][best];
-            edges[5][i][j] = -fitted[4] / contrast;
-            edges[6][i][j] = sqrt(squares / SAMPLES);
+            offset[i][j] = outwards * (known[filter][0][best] + moved) + inside;
+            dark[i][j] = low;
+            bright[i][j] = high;
+            slope[i][j] = outwards * (fitted[3] / greater(high, minimum_step));
+            sensitivity[i][j] = known[filter][2][best];
+            softness[i][j] = -fitted[4] / contrast;
+            residual[i][j] = sqrt(squares / SAMPLES);
         }
 }

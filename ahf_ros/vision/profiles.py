@@ -83,17 +83,15 @@ def measure_outlines(
     blurs = np.rint(np.clip(blur, *BLURS) / _BLUR_STEP).astype(int)
     at = outlines.points, outlines.normals, outlines.polarity
     of_width = reach, enough, blurs, _HALF_WIDTHS
-    groups, used = kernels.profile_groups(
-        *at, outlines.scale, *of_width, width - 1.0, height - 1.0, b=_BLURS
-    )
-    used[:, 0] = False
-    chosen = np.flatnonzero(used)
-    filters = np.full(used.size, -1)
+    groups = kernels.profile_groups(*at, outlines.scale, *of_width, width - 1.0, height - 1.0)
+    chosen = np.flatnonzero(np.bincount(groups.ravel()))
+    chosen = chosen[chosen % len(_HALF_WIDTHS) > 0]
+    filters = np.full(_BLURS * len(_HALF_WIDTHS), -1)
     filters[chosen] = np.arange(len(chosen))
     search, parts, known = _step_filters_of(chosen.tolist())
     of_curve = outlines.spacing, outlines.curvature, blur
     of_steps = np.tile(_HALF_WIDTHS, _BLURS), filters, _ALONG, search, parts, known
-    measured, visible = kernels.fit_steps(
+    *measured, visible = kernels.fit_steps(
         gray, *at, *of_curve, groups, *of_steps, _MAXIMUM_ASIDE, _MINIMUM_STEP
     )
     return Edges(*[*measured, outlines.scale, outlines.spacing, visible])
