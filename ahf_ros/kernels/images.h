@@ -84,4 +84,45 @@ static inline float value_of(count h, count w, const float image[h][w], const pl
     return over + at->down[a] * (under - over);
 }
 
+/* The values of an image of whole numbers at n places. */
+static inline void shorts_of(count h, count w, const int16_t image[h][w], const places *at, count n,
+                             float values[n])
+{
+    int32_t near[4][POINTS];
+    for (count a = 0; a < n; a++) {
+        count top = at->top[a], low = top + (h > 1), left = at->left[a], right = left + (w > 1);
+        near[0][a] = image[top][left], near[1][a] = image[top][right];
+        near[2][a] = image[low][left], near[3][a] = image[low][right];
+    }
+    for (count a = 0; a < n; a++) {
+        float over = (float)near[0][a] + at->across[a] * (float)(near[1][a] - near[0][a]);
+        float under = (float)near[2][a] + at->across[a] * (float)(near[3][a] - near[2][a]);
+        values[a] = over + at->down[a] * (under - over);
+    }
+}
+
+/* Points at a radius in n directions, which a frame has made those of an image. */
+static inline void place(count h, count w, count n, const float along[3][POINTS],
+                         const float centre[3], float radius, places *at)
+{
+    float column[POINTS], row[POINTS];
+    for (count a = 0; a < n; a++) {
+        float scale = along[2][a] * radius + centre[2];
+        column[a] = (along[0][a] * radius + centre[0]) / scale;
+        row[a] = (along[1][a] * radius + centre[1]) / scale;
+    }
+    hold(h, w, n, column, row, at);
+}
+
+/* What a frame makes of the centre, and of up to POINTS directions. */
+static inline void project(count n, const double frame[3][3], const double *x, const double *y,
+                           float along[3][POINTS], float centre[3])
+{
+    for (int row = 0; row < 3; row++) {
+        centre[row] = (float)frame[row][2];
+        for (count a = 0; a < n; a++)
+            along[row][a] = (float)(frame[row][0] * x[a] + frame[row][1] * y[a]);
+    }
+}
+
 #endif

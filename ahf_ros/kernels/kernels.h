@@ -350,8 +350,25 @@ void laid_prints(count h, count w, count k, count n, count m, count g, const flo
 
 /* ellipses.c */
 
-void strongest_steps(count k, count m, count n, const float values[k][m][n], const double scale[k],
-                     const double radii[k][n], double lowest, double highest, double flat,
-                     double displacement[k][m], double strongest[k][m], double steps[n]);
+/* Which of s outlines about points, and in which of the sizes radii[1] to radii[20], has the highest
+   mean step, from dark to bright times a scale. Outlines are in steps of the sizes, from the first
+   one: a whole number of them, and what is beside; each has a least size. */
+void best_outlines(count h, count w, count k, count s, const int16_t log[h][w],
+                   const double points[k][2], const double scale[k], const double rays[2][24],
+                   const double radii[22], const int32_t bins[s][24], const float beside[s][24],
+                   const double least[s], const double counted[2], int32_t best[k][2],
+                   double scores[k]);
+/* Frames of ellipses moved onto the strongest steps in a window (px, least and most radii) along up
+   to 64 rays, and the share of rays with a clear step that is near. */
+void moved_ellipses(count h, count w, count k, count m, const int16_t log[h][w],
+                    const double start[k][3][3], const double scale[k], const double rays[2][m],
+                    const double basis[m][5], const double places[13], const double window[3],
+                    const double counted[2], double flat, double least, double clear,
+                    double outlier, int16_t rounds, const double prior[5], const double inlier[2],
+                    double frames[k][3][3], double shares[k]);
+/* What makes ellipses as large as they are in gray values. */
+void gray_sizes(count h, count w, count k, const int16_t log[h][w], const double frames[k][3][3],
+                const double polarity[k], const double rays[2][16], const double places[13],
+                const double window[3], double unit, double flat, double sizes[k]);
 
 #endif

@@ -7,30 +7,6 @@
 #include "kernels.h"
 #include "robust.h"
 
-/* Points at a radius in n directions, which a frame has made those of an image. */
-static inline void place(count h, count w, count n, const float along[3][POINTS],
-                         const float centre[3], float radius, places *at)
-{
-    float column[POINTS], row[POINTS];
-    for (count a = 0; a < n; a++) {
-        float scale = along[2][a] * radius + centre[2];
-        column[a] = (along[0][a] * radius + centre[0]) / scale;
-        row[a] = (along[1][a] * radius + centre[1]) / scale;
-    }
-    hold(h, w, n, column, row, at);
-}
-
-/* What a frame makes of the centre, and of up to POINTS directions. */
-static inline void project(count n, const double frame[3][3], const double *x, const double *y,
-                           float along[3][POINTS], float centre[3])
-{
-    for (int row = 0; row < 3; row++) {
-        centre[row] = (float)frame[row][2];
-        for (count a = 0; a < n; a++)
-            along[row][a] = (float)(frame[row][0] * x[a] + frame[row][1] * y[a]);
-    }
-}
-
 /* Gray values of an image between pixels, in a range that begins at `lift` instead of at 0, at m
    directions on r circles about k targets, the innermost first; beyond the border the nearest pixel
    counts. The image shows all of a target, or a direction of it up to a radius. */

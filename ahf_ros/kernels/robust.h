@@ -170,4 +170,24 @@ static inline void least_squares(count m, count n, count q, const double basis[m
     solve(q, 1, solved, (double(*)[1])unknowns);
 }
 
+/* A linear model of values, by reweighting after Geman and McClure: a residual of `scale` leaves a
+   quarter of a weight. */
+static inline void linear_fit(count m, count n, const double values[m], const double weights[m],
+                              const double basis[m][n], const double products[m][n][n],
+                              const double prior[n], double scale, int16_t rounds,
+                              double unknowns[n], double residuals[m], double robust[m],
+                              double normal[n][n])
+{
+    for (int round = 0; round < rounds; round++) {
+        for (count j = 0; j < m; j++) {
+            robust[j] = weights[j];
+            if (round)
+                robust[j] *= geman_mcclure(residuals[j] / scale);
+        }
+        least_squares(m, n, n, basis, products, NULL, robust, values, prior, normal, unknowns);
+        for (count j = 0; j < m; j++)
+            residuals[j] = values[j] - dot(n, basis[j], unknowns);
+    }
+}
+
 #endif

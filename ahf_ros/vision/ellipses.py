@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import lru_cache
 
 import numpy as np
 
@@ -14,36 +13,33 @@ from ahf_ros.vision.candidates import Candidates
 from ahf_ros.vision.dots import NO_DOTS, Dots
 from ahf_ros.vision.log_edges import LOG_SCALE
 from ahf_ros.vision.pyramid import MINIMUM_ASPECT
-from ahf_ros.vision.robust import fit_linear, medians
-from ahf_ros.vision.sampling import sample_circles
 
-_RAYS, _FEW_RAYS = 32, 24  # about an ellipse that is refined, and about a candidate
-_ANGLES, _FEW_ANGLES = (2 * np.pi * np.arange(rays) / rays for rays in (_RAYS, _FEW_RAYS))
-_BINS = 22  # of the radius, in equal ratios
+_ANGLES, _SOME_ANGLES, _FEW_ANGLES = (2 * np.pi * np.arange(rays) / rays for rays in (32, 24, 16))
+_SOME_RAYS, _FEW_RAYS = (np.array([np.cos(of), np.sin(of)]) for of in (_SOME_ANGLES, _FEW_ANGLES))
+_SIZES = 22  # that are sampled about a candidate, in equal ratios
 _MINIMUM_RADIUS = 0.4  # radius sampled, in the smallest one of the range
 _MAXIMUM_RADIUS = 1.35  # the same, in the largest one
-_WIDTH = 1.5  # from the middle of an ellipse to where its weights end, bins
 _SHAPES = ((1.0, 1), (0.75, 4), (0.55, 6), (0.4, 8))  # aspect, number of directions
 _BESIDE, _SIDES = 0.4, 6  # distance of circles beside a candidate in their radius, directions
 _COUNTED = -0.3, 0.6  # steps of ln; one beyond counts no more
 _MINIMUM_SCORE = 0.15  # mean step of ln along the ellipse
 _SMALL = 8.0  # largest radius of a range of the first level that is fitted in the image, px
 _OVERSIZE = 1.6  # semi-major axis of a dot, in the largest radius of its range, at the most
-_WINDOWS = (  # about the ellipse, in its own radius; share of inliers; one of so many rays
-    (0.5, 0.25, 2),
-    (0.3, 0.3, 1),
-    (0.15, 0.35, 1),
+_WINDOWS = (  # about the ellipse, in its own radius; share of inliers; rays
+    (0.5, 0.25, _FEW_ANGLES),
+    (0.3, 0.3, _ANGLES),
+    (0.15, 0.35, _ANGLES),
 )
 _MINIMUM_WINDOW, _MAXIMUM_WINDOW = 2.0, 0.5  # the same: px, and in its own radius
-_PROFILE, _SAMPLES = 1.15, 13  # half length of a profile across it, in windows, and its samples
+_PLACES = np.linspace(-1.15, 1.15, 13)  # of samples of a profile across it, in windows
 _MINIMUM_STEP = 0.1  # of ln, for a ray to count in the fit
 _CLEAR_STEP = 1.5 * _MINIMUM_STEP  # for a ray to show the edge
 _FLAT = -1e-3  # curvature of a peak of the steps, from which its top is computed
 _ROUNDS = 3  # of robust least squares
 _OUTLIERS = 5.0  # to a window: residuals that quarter the weight of a ray
-_INLIER, _PIXEL_INLIER = 0.06, 0.4  # of the radius, or px
+_PRIOR = np.full(5, 1e-3)  # inverse variance of no change, in weights
+_INLIER = 0.06, 0.4  # of the radius, or px
 _MINIMUM_MINOR = 1.0  # px
-_PART = 512  # dots fitted at a time, which stay in the cache
 
 
 def fit_ellipses(logs: Sequence[np.ndarray], candidates: Sequence[Candidates]) -> Dots:
@@ -60,19 +56,28 @@ def fit_ellipses(logs: Sequence[np.ndarray], candidates: Sequence[Candidates]) -
         shrink = 2.0 ** (some.level - level)
         points = (some.points + 0.5) * shrink - 0.5
         low, high = (radius * shrink for radius in some.radii)
-        for start in range(0, len(points), _PART):
-            part = slice(start, start + _PART)
-            dots = _best_ellipses(logs[level], points[part], some.polarity[part], low, high)
-            dots = refine_ellipses(logs[level], dots)
-            dots = dots.select(frame.ellipse_axes(dots.frames)[0] < _OVERSIZE * high)
-            found.append(replace(dots, frames=frame.enlarged(dots.frames, level)))
+        dots = _best_ellipses(logs[level], points, some.polarity, low, high)
+        dots = refine_ellipses(logs[level], dots)
+        dots = dots.select(frame.ellipse_axes(dots.frames)[0] < _OVERSIZE * high)
+        found.append(replace(dots, frames=frame.enlarged(dots.frames, level)))
     return Dots.joined(found)
 
 
 def refine_ellipses(log: np.ndarray, dots: Dots) -> Dots:
     """Refine dots in px of a logarithmic image, and drop those that its edges do not support."""
-    for window, minimum_share, every in _WINDOWS:
-        dots = _refined(log, dots, window, _ANGLES[::every])
+    for window, minimum_share, angles in _WINDOWS:
+        frames, share = kernels.moved_ellipses(
+            log,
+            dots.frames,
+            dots.polarity / LOG_SCALE,
+            (np.cos(angles), np.sin(angles)),
+            frame.displacement_basis(angles, np.ones(len(angles)))[:, :5],
+            _PLACES,
+            (_MINIMUM_WINDOW, window, _MAXIMUM_WINDOW),
+            *(_COUNTED, _FLAT, _MINIMUM_STEP, _CLEAR_STEP),
+            *(window / _OUTLIERS, _ROUNDS, _PRIOR, _INLIER),
+        )
+        dots = Dots(frames, dots.polarity, share)
         major, minor, _ = frame.ellipse_axes(dots.frames)
         good = (minor > MINIMUM_ASPECT * major) & (minor > _MINIMUM_MINOR)
         good &= dots.share > minimum_share
@@ -84,70 +89,40 @@ def _best_ellipses(
     log: np.ndarray, points: np.ndarray, polarity: np.ndarray, low: float, high: float
 ) -> Dots:
     """Return the ellipses about points with the highest mean steps, if these are clear."""
-    x, y = points.T
-    templates, radii, ellipses = _templates(low, high)
-    one = np.ones(len(x))
-    frames = frame.affine_frames(x, y, one, one, 0 * one)
-    values = sample_circles(log, frames, _FEW_ANGLES, radii).astype(np.float32)
-    steps = (values[:, :, 2:] - values[:, :, :-2]) * (polarity / LOG_SCALE)[:, None, None]
-    steps = np.clip(steps, *_COUNTED, dtype=np.float32)
-    scores = steps.reshape(len(x), len(templates)) @ templates
-    best, highest = scores.argmax(axis=1), scores.max(axis=1)
-    move_x, move_y, *axes = ellipses[best].T
-    fitted = frame.affine_frames(x + move_x, y + move_y, *axes)
+    radii = np.geomspace(_MINIMUM_RADIUS * low, _MAXIMUM_RADIUS * high, _SIZES)
+    step = np.log(radii[1] / radii[0])
+    bins = np.rint(_OUTLINES / step).astype(np.int32)
+    of_outlines = bins, _OUTLINES / step - bins, -np.log(_SMALLEST) / step
+    best, highest = kernels.best_outlines(
+        log, points, polarity / LOG_SCALE, _SOME_RAYS, radii, *of_outlines, _COUNTED
+    )
+    size, found = radii[1 + best[:, 1]], _ELLIPSES[best[:, 0]].T
+    x, y = points.T + size * found[:2]
+    fitted = frame.affine_frames(x, y, *size * found[2:4], found[4])
     return Dots(fitted, polarity, highest).select(highest > _MINIMUM_SCORE)
 
 
-@lru_cache(maxsize=16)  # a megabyte each; radii may be set to any number while a node runs
-def _templates(low: float, high: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return templates of ellipses about a candidate, and of circles beside it.
+def _outlines() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return outlines of ellipses about a candidate, and of circles beside it, of size 1.
 
-    They are weights, float32 of shape (rays x bins, n), that average steps along each of n; the
-    radii that are sampled, shape (bins + 2,); and the centres of the ellipses, seen from the
-    candidate, with their semi-axes and directions, shape (n, 5).
+    They are ln of their radii along rays, shape (n, rays); their smallest radii, shape (n,); and
+    their centres, seen from the candidate, semi-axes and directions, shape (n, 5).
     """
-    radii = np.geomspace(_MINIMUM_RADIUS * low, _MAXIMUM_RADIUS * high, _BINS)
-    ratio = np.log(radii[1] / radii[0])
-    middle = radii[1:-1]
     outlines, ellipses = [], []
     for aspect, count in _SHAPES:
         for direction in np.pi * np.arange(count) / count:
-            along, across = (
-                np.cos(_FEW_ANGLES - direction),
-                np.sin(_FEW_ANGLES - direction) / aspect,
-            )
-            for major in middle[middle * aspect >= middle[0]]:
-                outlines.append(major / np.hypot(along, across))
-                ellipses.append((0.0, 0.0, major, aspect * major, direction))
+            angles = _SOME_ANGLES - direction
+            outlines.append(1 / np.hypot(np.cos(angles), np.sin(angles) / aspect))
+            ellipses.append((0.0, 0.0, 1.0, aspect, direction))
     for direction in 2 * np.pi * np.arange(_SIDES) / _SIDES:
-        along, across = (_BESIDE * of(_FEW_ANGLES - direction) for of in (np.cos, np.sin))
-        x, y = _BESIDE * np.cos(direction), _BESIDE * np.sin(direction)
-        for radius in middle[middle * (1 - _BESIDE) >= middle[0]]:
-            outlines.append(radius * (along + np.sqrt(1 - across**2)))
-            ellipses.append((x * radius, y * radius, radius, radius, 0.0))
-    bins = np.log(np.array(outlines) / middle[0]) / ratio
-    distance = np.abs(bins[:, :, None] - np.arange(len(middle)))
-    weights = np.clip(_WIDTH - distance, 0, 1, dtype=np.float32) / _FEW_RAYS
-    return weights.reshape(len(weights), -1).T, radii, np.array(ellipses)
+        along, across = (_BESIDE * of(_SOME_ANGLES - direction) for of in (np.cos, np.sin))
+        outlines.append(along + np.sqrt(1 - across**2))
+        ellipses.append((_BESIDE * np.cos(direction), _BESIDE * np.sin(direction), 1.0, 1.0, 0.0))
+    x, y, _, minor, _ = np.array(ellipses).T
+    return np.log(outlines), minor - np.hypot(x, y), np.array(ellipses)
 
 
-def _refined(log: np.ndarray, dots: Dots, window: float, angles: np.ndarray) -> Dots:
-    """Return dots moved onto the strongest steps near their ellipses."""
-    size = frame.mean_radii(dots.frames)[:, None]
-    radii, windows = _profiles(size, window)
-    values = sample_circles(log, dots.frames, angles, radii).astype(np.float32)
-    of_values = values, dots.polarity / LOG_SCALE, radii, *_COUNTED, _FLAT
-    displacement, step, _ = kernels.strongest_steps(*of_values)
-    half = len(angles) // 2
-    middle = np.partition(step, half, axis=1)[:, half, None]
-    usual = np.maximum(middle, _MINIMUM_STEP)
-    weights = np.clip(step / usual, 0, 1) * (step > _MINIMUM_STEP)
-    basis = frame.displacement_basis(angles, np.ones(len(angles)))[:, :5]
-    changes, errors = fit_linear(displacement, weights, basis, window / _OUTLIERS, _ROUNDS)
-    inlying = np.abs(errors) < np.maximum(_INLIER, _PIXEL_INLIER / size)
-    share = (inlying & (step > _CLEAR_STEP)).mean(axis=1)
-    frames = frame.moved(dots.frames, np.clip(changes, -windows, windows))
-    return Dots(frames, dots.polarity, share)
+_OUTLINES, _SMALLEST, _ELLIPSES = _outlines()
 
 
 def resized(log: np.ndarray, dots: Dots) -> Dots:
@@ -155,20 +130,8 @@ def resized(log: np.ndarray, dots: Dots) -> Dots:
 
     In a logarithm a blurred edge lies on its dark side.
     """
-    if not len(dots.frames):
-        return dots
-    window, _, _ = _WINDOWS[-1]
-    radii, _ = _profiles(frame.mean_radii(dots.frames)[:, None], window)
-    values = sample_circles(log, dots.frames, _ANGLES[::2], radii).astype(np.float32)
-    values = np.exp((values - values.max(axis=2, keepdims=True)) / np.float32(LOG_SCALE))
-    of_values = values, dots.polarity.astype(float), radii, -1.0, 1.0, _FLAT
-    displacement, *_ = kernels.strongest_steps(*of_values)
-    frames = dots.frames.copy()
-    frames[:, :2, :2] *= 1 + medians(displacement)[:, None, None]
-    return replace(dots, frames=frames)
-
-
-def _profiles(size: np.ndarray, window: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return the radii of profiles across ellipses, and their windows."""
-    windows = np.clip(_MINIMUM_WINDOW / size, window, _MAXIMUM_WINDOW)
-    return 1 + np.linspace(-_PROFILE, _PROFILE, _SAMPLES) * windows, windows
+    window = _MINIMUM_WINDOW, _WINDOWS[-1][0], _MAXIMUM_WINDOW
+    sizes = kernels.gray_sizes(
+        log, dots.frames, dots.polarity, _FEW_RAYS, _PLACES, window, LOG_SCALE, _FLAT
+    )
+    return replace(dots, frames=frame.scaled(dots.frames, sizes))

@@ -30,41 +30,24 @@ def sample_circles(
     """Return the values of an image on concentric circles of targets.
 
     It does what `sample` does for the projected `frame.circle_points`, in single precision and in
-    parts that stay in the cache. Radii of shape (n,) are the same for all k frames, those of shape
-    (k, n) are others for each; with m angles, the values have the shape (k, m, n).
+    parts that stay in the cache. With k frames, m angles and n radii, the values have the shape
+    (k, m, n).
     """
-    values = np.empty((len(frames), len(angles), radii.shape[-1]), image.dtype)
+    values = np.empty((len(frames), len(angles), len(radii)), image.dtype)
+    directions, radii = np.array([np.cos(angles), np.sin(angles)]), radii.astype(np.float32)
+    affine = bool((frames[:, 2] == (0, 0, 1)).all())
     step = max(1, _REMAP_ROWS // len(angles))
     for start in range(0, len(frames), step):
-        part = slice(start, start + step)
-        across, down = circle_places(
-            frames[part], angles, radii if radii.ndim < 2 else radii[part]
-        )
-        shape = (across.shape[0] * across.shape[1], -1)
-        sampled = remapped(image, across.reshape(shape), down.reshape(shape))
-        values[part] = sampled.reshape(across.shape)
+        part = frames[start : start + step]
+        along = (part[:, :, :2] @ directions).astype(np.float32)[..., None]
+        centre = part[:, :, 2].astype(np.float32)[..., None, None]
+        x, y, *scale = (along[:, row] * radii + centre[:, row] for row in range(3 - affine))
+        for points in (x, y) if scale else ():
+            points /= scale[0]
+        shape = (len(part) * len(angles), len(radii))
+        sampled = remapped(image, x.reshape(shape), y.reshape(shape))
+        values[start : start + step] = sampled.reshape(x.shape)
     return values
-
-
-def circle_places(
-    frames: np.ndarray, angles: np.ndarray, radii: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return x and y of points on concentric circles of targets, float32, (k, m, n) each.
-
-    The arguments are those of `sample_circles`.
-    """
-    directions = np.array([np.cos(angles), np.sin(angles)])
-    along = (frames[:, :, :2] @ directions).astype(np.float32)[..., None]
-    centre = frames[:, :, 2].astype(np.float32)[..., None, None]
-    radii = radii.astype(np.float32)[..., None, :]
-    affine = bool((frames[:, 2] == (0, 0, 1)).all())
-    rows = [along[:, row] * radii for row in range(2 if affine else 3)]
-    for row, points in enumerate(rows):
-        points += centre[:, row]
-    x, y, *scale = rows
-    for points in (x, y) if scale else ():
-        points /= scale[0]
-    return x, y
 
 
 def within(pixels: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
-from ahf_ros.vision import ellipses, frame
+from ahf_ros.vision import frame
 from ahf_ros.vision.candidates import Candidates
 from ahf_ros.vision.dots import Dots
 from ahf_ros.vision.ellipses import fit_ellipses, refine_ellipses
@@ -115,9 +115,3 @@ def test_a_candidate_on_even_ground_has_no_ellipse() -> None:
     candidate = Candidates(1, np.array([[80.0, 20.0]]), (5.8, 11.2), np.array([1]))
     dots = fit_ellipses(image_pyramid(drawn([(60, 60, 12, 12, 0)]), 60.0).logs, [candidate])
     assert len(dots.frames) == len(dots.polarity) == len(dots.share) == 0
-
-
-def test_no_number_of_radii_fills_the_memory() -> None:
-    for number in range(40):
-        ellipses._templates(4.0, 5.0 + number)
-    assert ellipses._templates.cache_info().currsize <= 16
