@@ -14,8 +14,16 @@ from ahf_ros.vision.dots import NO_DOTS, Dots
 from ahf_ros.vision.log_edges import LOG_SCALE
 from ahf_ros.vision.pyramid import MINIMUM_ASPECT
 
-_ANGLES, _SOME_ANGLES, _FEW_ANGLES = (2 * np.pi * np.arange(rays) / rays for rays in (32, 24, 16))
-_SOME_RAYS, _FEW_RAYS = (np.array([np.cos(of), np.sin(of)]) for of in (_SOME_ANGLES, _FEW_ANGLES))
+
+def _rays(count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return unit vectors along rays, (2, count), and how changes move edges there, (count, 5)."""
+    angles = 2 * np.pi * np.arange(count) / count
+    basis = frame.displacement_basis(angles, np.ones(count))[:, :5]
+    return np.array([np.cos(angles), np.sin(angles)]), basis.copy()
+
+
+_ANGLES = 2 * np.pi * np.arange(24) / 24  # of rays about a candidate
+_ABOUT, _FEW, _MANY = map(_rays, (24, 16, 32))
 _SIZES = 22  # that are sampled about a candidate, in equal ratios
 _MINIMUM_RADIUS = 0.4  # radius sampled, in the smallest one of the range
 _MAXIMUM_RADIUS = 1.35  # the same, in the largest one
@@ -26,9 +34,9 @@ _MINIMUM_SCORE = 0.15  # mean step of ln along the ellipse
 _SMALL = 8.0  # largest radius of a range of the first level that is fitted in the image, px
 _OVERSIZE = 1.6  # semi-major axis of a dot, in the largest radius of its range, at the most
 _WINDOWS = (  # about the ellipse, in its own radius; share of inliers; rays
-    (0.5, 0.25, _FEW_ANGLES),
-    (0.3, 0.3, _ANGLES),
-    (0.15, 0.35, _ANGLES),
+    (0.5, 0.25, _FEW),
+    (0.3, 0.3, _MANY),
+    (0.15, 0.35, _MANY),
 )
 _MINIMUM_WINDOW, _MAXIMUM_WINDOW = 2.0, 0.5  # the same: px, and in its own radius
 _PLACES = np.linspace(-1.15, 1.15, 13)  # of samples of a profile across it, in windows
@@ -51,7 +59,7 @@ def fit_ellipses(logs: Sequence[np.ndarray], candidates: Sequence[Candidates]) -
     returned, in px of the first level.
     """
     found = [NO_DOTS]
-    for some in candidates:
+    for some in (of for of in candidates if len(of.points)):
         level = 0 if some.level == 1 and some.radii[1] < _SMALL else some.level
         shrink = 2.0 ** (some.level - level)
         points = (some.points + 0.5) * shrink - 0.5
@@ -65,13 +73,12 @@ def fit_ellipses(logs: Sequence[np.ndarray], candidates: Sequence[Candidates]) -
 
 def refine_ellipses(log: np.ndarray, dots: Dots) -> Dots:
     """Refine dots in px of a logarithmic image, and drop those that its edges do not support."""
-    for window, minimum_share, angles in _WINDOWS:
+    for window, minimum_share, rays in _WINDOWS:
         frames, share = kernels.moved_ellipses(
             log,
             dots.frames,
             dots.polarity / LOG_SCALE,
-            (np.cos(angles), np.sin(angles)),
-            frame.displacement_basis(angles, np.ones(len(angles)))[:, :5],
+            *rays,
             _PLACES,
             (_MINIMUM_WINDOW, window, _MAXIMUM_WINDOW),
             *(_COUNTED, _FLAT, _MINIMUM_STEP, _CLEAR_STEP),
@@ -94,11 +101,11 @@ def _best_ellipses(
     bins = np.rint(_OUTLINES / step).astype(np.int32)
     of_outlines = bins, _OUTLINES / step - bins, -np.log(_SMALLEST) / step
     best, highest = kernels.best_outlines(
-        log, points, polarity / LOG_SCALE, _SOME_RAYS, radii, *of_outlines, _COUNTED
+        log, points, polarity / LOG_SCALE, _ABOUT[0], radii, *of_outlines, _COUNTED
     )
-    size, found = radii[1 + best[:, 1]], _ELLIPSES[best[:, 0]].T
-    x, y = points.T + size * found[:2]
-    fitted = frame.affine_frames(x, y, *size * found[2:4], found[4])
+    x, y, major, minor, angle = _ELLIPSES[best[:, 0]].T
+    x, y, major, minor = radii[1 + best[:, 1]] * (x, y, major, minor)
+    fitted = frame.affine_frames(points[:, 0] + x, points[:, 1] + y, major, minor, angle)
     return Dots(fitted, polarity, highest).select(highest > _MINIMUM_SCORE)
 
 
@@ -111,11 +118,11 @@ def _outlines() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     outlines, ellipses = [], []
     for aspect, count in _SHAPES:
         for direction in np.pi * np.arange(count) / count:
-            angles = _SOME_ANGLES - direction
+            angles = _ANGLES - direction
             outlines.append(1 / np.hypot(np.cos(angles), np.sin(angles) / aspect))
             ellipses.append((0.0, 0.0, 1.0, aspect, direction))
     for direction in 2 * np.pi * np.arange(_SIDES) / _SIDES:
-        along, across = (_BESIDE * of(_SOME_ANGLES - direction) for of in (np.cos, np.sin))
+        along, across = (_BESIDE * of(_ANGLES - direction) for of in (np.cos, np.sin))
         outlines.append(along + np.sqrt(1 - across**2))
         ellipses.append((_BESIDE * np.cos(direction), _BESIDE * np.sin(direction), 1.0, 1.0, 0.0))
     x, y, _, minor, _ = np.array(ellipses).T
@@ -130,8 +137,10 @@ def resized(log: np.ndarray, dots: Dots) -> Dots:
 
     In a logarithm a blurred edge lies on its dark side.
     """
+    if not len(dots.frames):
+        return dots
     window = _MINIMUM_WINDOW, _WINDOWS[-1][0], _MAXIMUM_WINDOW
     sizes = kernels.gray_sizes(
-        log, dots.frames, dots.polarity, _FEW_RAYS, _PLACES, window, LOG_SCALE, _FLAT
+        log, dots.frames, dots.polarity, _FEW[0], _PLACES, window, LOG_SCALE, _FLAT
     )
     return replace(dots, frames=frame.scaled(dots.frames, sizes))
