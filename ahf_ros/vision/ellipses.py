@@ -46,7 +46,7 @@ _FLAT = -1e-3  # curvature of a peak of the steps, from which its top is compute
 _ROUNDS = 3  # of robust least squares
 _OUTLIERS = 5.0  # to a window: residuals that quarter the weight of a ray
 _PRIOR = np.full(5, 1e-3)  # inverse variance of no change, in weights
-_INLIER = 0.06, 0.4  # of the radius, or px
+_INLIER, _PIXEL_INLIER = 0.06, 0.4  # of the radius, or px
 _MINIMUM_MINOR = 1.0  # px
 
 
@@ -82,7 +82,7 @@ def refine_ellipses(log: np.ndarray, dots: Dots) -> Dots:
             _PLACES,
             (_MINIMUM_WINDOW, window, _MAXIMUM_WINDOW),
             *(_COUNTED, _FLAT, _MINIMUM_STEP, _CLEAR_STEP),
-            *(window / _OUTLIERS, _ROUNDS, _PRIOR, _INLIER),
+            *(window / _OUTLIERS, _ROUNDS, _PRIOR, (_INLIER, _PIXEL_INLIER)),
         )
         dots = Dots(frames, dots.polarity, share)
         major, minor, _ = frame.ellipse_axes(dots.frames)
