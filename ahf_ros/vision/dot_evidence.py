@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ahf_ros.vision.frame import circle_points, ellipse_axes, project
+from ahf_ros.vision.frame import circle_points, determinants, ellipse_axes, project
 from ahf_ros.vision.log_edges import LOG_SCALE
 from ahf_ros.vision.sampling import sample, within
 
@@ -69,5 +69,5 @@ def dot_evidence(
 
 def independent_rays(frames: np.ndarray) -> np.ndarray:
     """Return the share of rays round dots with frames (..., 3, 3) that count as independent."""
-    length = 2 * np.pi * np.sqrt(np.abs(np.linalg.det(frames[..., :2, :2])))
+    length = 2 * np.pi * np.sqrt(np.abs(determinants(frames)))
     return np.clip(length / _CORRELATION, 4, _RAYS) / _RAYS

@@ -164,7 +164,8 @@ def ellipse_axes(frames: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray
 def shapes(frames: np.ndarray) -> np.ndarray:
     """Return the shapes of dots: squares of the affine parts of their frames, (k, 2, 2), px^2."""
     affine = local_affine(frames)
-    return affine @ affine.transpose(0, 2, 1)
+    across, down = affine[:, :, 0], affine[:, :, 1]
+    return np.asarray(across[:, :, None] * across[:, None] + down[:, :, None] * down[:, None])
 
 
 def axes_of(square: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -185,6 +186,19 @@ def mean_radii(frames: np.ndarray) -> np.ndarray:
 def local_affine(frames: np.ndarray) -> np.ndarray:
     """Return the derivatives of frames' maps at the centre, shape (..., 2, 2), px a radius."""
     return frames[..., :2, :2] - frames[..., :2, 2:] * frames[..., 2:, :2]
+
+
+def determinants(maps: np.ndarray) -> np.ndarray:
+    """Return the determinants of linear maps of the plane, shape (..., 2, 2)."""
+    return np.asarray(maps[..., 0, 0] * maps[..., 1, 1] - maps[..., 0, 1] * maps[..., 1, 0])
+
+
+def inverses(maps: np.ndarray) -> np.ndarray:
+    """Return the inverses of linear maps of the plane, shape (..., 2, 2), all of some size."""
+    scale, inverse = 1 / determinants(maps), np.empty_like(maps)
+    inverse[..., 0, 0], inverse[..., 1, 1] = maps[..., 1, 1] * scale, maps[..., 0, 0] * scale
+    inverse[..., 0, 1], inverse[..., 1, 0] = maps[..., 0, 1] * -scale, maps[..., 1, 0] * -scale
+    return inverse
 
 
 def centre_covariance(frames: np.ndarray, covariance: np.ndarray) -> np.ndarray:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ahf_ros.vision.frame import project
+from ahf_ros.vision.frame import determinants, project
 
 _ROUNDS = 3  # of linear solutions: each divides by the depth of the one before
 _PERSPECTIVE = 0.08  # usual change of depth from the centre of an object to its edge, relative
@@ -82,7 +82,7 @@ def local_frames(homographies: np.ndarray, points: np.ndarray, radii: np.ndarray
     frames = np.zeros((*points.shape[:2], 3, 3))
     slopes = homographies[:, None, :2, :2] - centres[..., None] * homographies[:, None, 2:, :2]
     frames[..., :2, :2] = slopes * (radii / depth[..., 0])[..., None, None]
-    frames[..., 1] *= np.sign(np.linalg.det(frames[..., :2, :2]))[..., None]
+    frames[..., 1] *= np.sign(determinants(frames))[..., None]
     frames[..., :2, 2], frames[..., 2, 2] = centres, 1.0
     return frames
 

@@ -77,3 +77,9 @@ def test_the_axes_of_a_shape_give_it_again() -> None:
     root = frame.local_affine(again)
     assert root @ root == pytest.approx(square)
     assert root == pytest.approx(root.transpose(0, 2, 1))
+
+
+def test_inverse_maps_undo_maps() -> None:
+    maps = OBLIQUE[:, :2, :2] * np.arange(1.0, 4)[:, None, None]
+    assert frame.inverses(maps) @ maps == pytest.approx(np.tile(np.eye(2), (3, 1, 1)))
+    assert frame.determinants(maps) == pytest.approx(246 * np.arange(1, 4) ** 2)

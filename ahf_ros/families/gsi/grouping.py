@@ -133,7 +133,7 @@ def neighbours(
     centres = dots.frames[:, :2, 2]
     major = frame.ellipse_axes(dots.frames)[0]
     size = np.log(major)
-    inverse = np.linalg.inv(dots.frames[:, :2, :2])
+    inverse = frame.inverses(dots.frames[:, :2, :2])
     unit_x, unit_y = (inverse[:, 0] - 1j * inverse[:, 1]).T
     widest = np.log(family.template_radii.max() / family.template_radii.min())
     limit = np.full(len(centres), np.inf)
@@ -303,7 +303,7 @@ def _members(
         if not good.any():
             continue
         members, affine = members[good], affine[good]
-        origin, inverse = dots.frames[members[:, role], :2, 2], np.linalg.inv(affine)
+        origin, inverse = dots.frames[members[:, role], :2, 2], frame.inverses(affine)
         error = np.zeros(len(members))
         for index in np.setdiff1d(np.arange(len(places)), (role, partner, third)):
             expected = origin + affine @ arms[index]
@@ -362,7 +362,7 @@ def _bears_out(
     _, minor, _ = frame.ellipse_axes(dots.frames)
     which = members[:, roles]
     allowed = _ELLIPSE_ERROR + _ELLIPSE_PIXELS / minor[which]
-    inverse = np.linalg.inv(dots.frames[:, :2, :2])
+    inverse = frame.inverses(dots.frames[:, :2, :2])
     printed = family.template_radii[[*roles]] / family.template_radii[roles[0]]
     relative = inverse[which] @ affine[:, None] * printed[:, None, None]
     square = (relative**2).sum(axis=(2, 3)) / 2
@@ -410,7 +410,7 @@ def _mostly_empty(templates: Templates, nearest: Nearest, family: PointPrint) ->
     count = len(family.template)
     frames = local_frames(templates.homographies, family.places[count:], family.radii[count:])
     single = frames.reshape(-1, 3, 3)
-    found, _ = nearest(single[:, :2, 2], np.linalg.inv(single[:, :2, :2]), 1.0)
+    found, _ = nearest(single[:, :2, 2], frame.inverses(single[:, :2, :2]), 1.0)
     found = np.sort(found.reshape(frames.shape[:2]), axis=1)
     different = (np.diff(found, axis=1, prepend=-1) > 0).sum(axis=1)
     return different <= family.rule.dots + _STRAY
