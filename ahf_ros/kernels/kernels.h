@@ -296,7 +296,7 @@ void square_frames(count k, const double corners[k][4][2], double frames[k][3][3
 void taken_places(count k, count n, const double places[k][2], const double reach[k],
                   const double points[n][2], bool taken[k]);
 void place_owners(count k, const double places[k][2], const double reach[k],
-                  const int64_t kinds[k], bool owning[k]);
+                  const int64_t kinds[k], int64_t most, bool owning[k]);
 void place_rivals(count k, const double places[k][2], const double reach[k],
                   const int64_t groups[k], const int64_t numbers[k], const double odds[k],
                   double none, double no_number, double of_groups[k], double of_numbers[k]);

@@ -44,17 +44,19 @@ void taken_places(count k, count n, const double places[k][2], const double reac
 }
 
 /* Which of k readings, the best first, own their place: no owner of the same kind is before them
-   within the reach of either. */
+   within the reach of either, and fewer than so many of any kind. */
 void place_owners(count k, const double places[k][2], const double reach[k],
-                  const int64_t kinds[k], bool owning[k])
+                  const int64_t kinds[k], int64_t most, bool owning[k])
 {
     for (count i = 0; i < k; i++)
         owning[i] = true;
-    for (count i = 0; i < k; i++)
+    for (count i = 0; i < k; i++) {
+        owning[i] = owning[i] && most-- > 0;
         for (count j = i + 1; owning[i] && j < k; j++)
             if (kinds[i] == kinds[j] &&
                 within_reach(places[i], places[j], greater(reach[i], reach[j])))
                 owning[j] = false;
+    }
 }
 
 /* The highest odds in the place of each reading: of other groups, or `none`, and of other numbers

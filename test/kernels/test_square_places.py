@@ -37,7 +37,9 @@ def test_readings_of_one_place(seed: int) -> None:
             if i < j and owning[i] and groups[i] == groups[j]:
                 owning[j] = False
         assert (of_groups[i], of_numbers[i]) == (max(others), max(numbered))
-    assert kernels.place_owners(places, reach, groups).tolist() == owning
+    for most in (0, 1, 7, count):
+        first = [own and sum(owning[:i]) < most for i, own in enumerate(owning)]
+        assert kernels.place_owners(places, reach, groups, most).tolist() == first
 
 
 @pytest.mark.parametrize('seed', SEEDS)

@@ -13,6 +13,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from ahf_ros import kernels
 from ahf_ros.families.cctag.rays import PROFILE, RAYS, ray_angles
 from ahf_ros.families.cctag.templates import (
     CLIPPED,
@@ -211,14 +212,6 @@ def likely_rings(
 def _best(parts: Sequence[_Likely], most: int) -> np.ndarray:
     """Return the best frames of different places."""
     frames, better = (np.concatenate(of) for of in zip(*parts, strict=True))
-    size, centres = frame.mean_radii(frames), frames[:, :2, 2]
-    kept: list[int] = []
-    free = np.ones(len(size), bool)
-    for index in np.argsort(-better, kind='stable').tolist():
-        if len(kept) == most:
-            break
-        if free[index]:
-            away = np.hypot(*(centres - centres[index]).T)
-            free &= away >= _APART * np.maximum(size, size[index])
-            kept.append(index)
-    return frames[kept]
+    frames = frames[np.argsort(-better, kind='stable')]
+    centres, apart = frames[:, :2, 2], _APART * frame.mean_radii(frames)
+    return frames[kernels.place_owners(centres, apart, np.zeros(len(frames), int), most)]

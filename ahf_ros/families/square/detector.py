@@ -238,7 +238,7 @@ def _odds_together(readings: Readings, groups: Groups) -> np.ndarray:
 
 def _owning(readings: Readings, kinds: np.ndarray) -> np.ndarray:
     """Return which readings, the best first, are the first of their kind, (k,), in a place."""
-    owning: np.ndarray = kernels.place_owners(*_places_of(readings.corners), kinds)
+    owning: np.ndarray = kernels.place_owners(*_places_of(readings.corners), kinds, len(kinds))
     return owning
 
 
