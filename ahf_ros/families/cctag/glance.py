@@ -47,6 +47,9 @@ _LOOKED_AT = 2  # frames for an ID, at the most
 _APART = 0.1  # distance of the centres of different frames, radii
 _LEAST_UNLIKE = 1e-6  # of squares of gray values, of their mean
 _READ = 128  # circles that are read at a time
+_IN_A_ROW = 8  # templates whose mean is compared before them
+_COARSE = 0.1  # of a share, which it may explain less: of targets, it explains more
+_FEW_DISCS = 23  # one of so many discs is compared before them all
 _PART = 4096  # circles that are looked at at a time, which bounds the memory
 LARGEST = 1 / 0.15
 """Radius of the outermost circle, in radii of any other."""
@@ -98,7 +101,7 @@ class _Outermost(ArrayRecord):
     sign: np.ndarray  # int, (k,), the polarity, or 0 if it is unknown
     factor: np.ndarray  # (k,), of the radius
     radius: np.ndarray  # (k,), mean, px
-    profiles: np.ndarray  # float32, (k, m), weighted
+    profiles: np.ndarray  # float32, (k, m), weighted, with squares of a sum of 1
 
     @staticmethod
     def of(circles: Circles, radii: Sequence[tuple[float, float]]) -> _Outermost:
@@ -109,34 +112,39 @@ class _Outermost(ArrayRecord):
         row, step = np.nonzero(tried)
         factor = SIZE_STEP ** _STEPS[step]
         resampled = circles.profiles @ _resampling()
-        resampled = resampled.reshape(*tried.shape, len(PROFILE[::_EVERY]))
+        profiles = resampled.reshape(*tried.shape, len(PROFILE[::_EVERY]))[row, step]
+        profiles /= np.sqrt(totals(profiles))[:, None]
         return _Outermost(
             circle=row,
             octave=circles.octave[row],
             sign=circles.polarity[row] * np.where(_STEPS[step] < _OUTERMOST.stop, 1, -1),
             factor=factor,
             radius=frame.mean_radii(circles.frames)[row] * factor,
-            profiles=resampled[row, step],
+            profiles=profiles,
         )
 
-    def better(self, polarity: int, family: CctagPrint) -> np.ndarray:
-        """Return how much likelier the rings of a family are than discs, (k,), 0 if unlikely."""
-        narrow = family.narrow * self.radius
-        tried = np.flatnonzero((narrow >= _NARROWEST) & (self.sign * polarity >= 0))
-        sharp = tuple((polarity * of[0], *of[1:3], polarity * of[3]) for of in _EDGES)
-        better = np.zeros(len(narrow))
-        for size, of_size in by_value(size_steps(self.radius[tried])):
-            some = tried[of_size]
-            profiles = polarity * self.profiles[some]
-            found = _better(profiles, family, size, sharp)
-            soft = _DEFOCUSED * family.narrow * SIZE_STEP**size
-            if soft > _EDGES[0][1]:
-                left = np.flatnonzero(found == 0)
-                defocused = ((0.0, soft, 0.0, 0.0),)
-                # Those in focus come first.
-                found[left] = 0.5 * _better(profiles[left], family, size, defocused)
-            better[some] = found
-        return better * self.radius
+    def better(self, kinds: Sequence[tuple[int, CctagPrint]]) -> list[np.ndarray]:
+        """Return how much likelier rings of each kind are than discs, (k,), 0 if unlikely."""
+        better = [np.zeros(len(self.radius)) for _ in kinds]
+        for size, of_size in by_value(size_steps(self.radius)):
+            some = self.select(of_size)
+            for of_kind, (polarity, family) in zip(better, kinds, strict=True):
+                wide = family.narrow * some.radius >= _NARROWEST
+                rows = np.flatnonzero(wide & (some.sign * polarity >= 0))
+                if not len(rows):
+                    continue
+                # Ink is dark.
+                ink = -polarity * some.profiles[rows]
+                sharp = tuple((polarity * of[0], *of[1:3], polarity * of[3]) for of in _EDGES)
+                found = _better(ink, family, size, sharp)
+                soft = _DEFOCUSED * family.narrow * SIZE_STEP**size
+                if soft > _EDGES[0][1]:
+                    left = np.flatnonzero(found == 0)
+                    defocused = ((0.0, soft, 0.0, 0.0),)
+                    # Those in focus come first.
+                    found[left] = 0.5 * _better(ink[left], family, size, defocused)
+                of_kind[of_size[rows]] = found * some.radius[rows]
+        return better
 
 
 @lru_cache(maxsize=1)
@@ -153,29 +161,46 @@ def _resampling() -> np.ndarray:
 @lru_cache(maxsize=512)
 def _templates(
     family: CctagPrint, size: int, edges: tuple[Edge, ...]
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return templates of rings and of discs; all sizes of both families have their place."""
-    return templates(family, size, edges, _EVERY)[0], discs(size, edges, _EVERY)
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return templates of rings, fewer that are like them, and those of discs, as columns.
+
+    All sizes of both families have their place. Where the mean of templates in a row explains less
+    of one than discs do, it is there itself.
+    """
+    of_rings, of_discs = (
+        np.ascontiguousarray(of.T)
+        for of in (templates(family, size, edges, _EVERY)[0], discs(size, edges, _EVERY))
+    )
+    of_some = of_rings.reshape(len(of_rings), -1, _IN_A_ROW).sum(axis=2)
+    of_some /= np.linalg.norm(of_some, axis=0)
+    lost = (of_rings.T @ of_some).max(axis=1) ** 2 < _least(of_rings.T, of_discs)
+    return of_rings, np.concatenate([of_some, of_rings[:, lost]], axis=1), of_discs
 
 
-def _better(
-    profiles: np.ndarray, family: CctagPrint, size: int, edges: tuple[Edge, ...]
-) -> np.ndarray:
-    """Return by how much less of profiles, (k, n), rings leave than discs, ln, (k,).
+def _better(ink: np.ndarray, family: CctagPrint, size: int, edges: tuple[Edge, ...]) -> np.ndarray:
+    """Return by how much less of profiles of ink, (k, n), rings leave than discs, ln, (k,).
 
     It is 0 of what is not like rings.
     """
-    of_rings, of_any_disc = _templates(family, size, edges)
-    better = np.zeros(len(profiles))
-    total = totals(profiles)
-    share = np.minimum((profiles @ of_rings.T).min(axis=1), 0) ** 2 / total  # ink is dark
-    likely = np.flatnonzero(share >= _PROMISING)
-    if not len(likely):
+    of_rings, of_some, of_any_disc = _templates(family, size, edges)
+    least = _least(ink, of_any_disc)
+    better = 0.0 * least
+    rows = np.flatnonzero(np.maximum((ink @ of_some).max(axis=1), 0) ** 2 >= least - _COARSE)
+    if not len(rows):
         return better
-    of_discs = np.abs(profiles[likely] @ of_any_disc.T).max(axis=1) ** 2 / total[likely]
-    less = _OF_DISCS * np.log1p(-of_discs) - np.log1p(-share[likely])
-    better[likely] = np.where(share[likely] > of_discs, less, 0)
+    share = np.maximum((ink[rows] @ of_rings).max(axis=1), 0) ** 2
+    likely = share >= least[rows]
+    rows, share = rows[likely], share[likely]
+    of_discs = np.abs(ink[rows] @ of_any_disc).max(axis=1) ** 2
+    less = _OF_DISCS * np.log1p(-of_discs) - np.log1p(-share)
+    better[rows] = np.where(share > of_discs, less, 0)
     return better
+
+
+def _least(ink: np.ndarray, of_discs: np.ndarray) -> np.ndarray:
+    """Return the share of profiles that rings explain at the least, (k,): that of some discs."""
+    of_some = np.abs(ink @ of_discs[:, ::_FEW_DISCS]).max(axis=1)
+    return np.maximum(of_some**2, np.float32(_PROMISING))
 
 
 def likely_rings(
@@ -194,8 +219,7 @@ def likely_rings(
     for start in range(0, max(len(order), 1), _PART):
         part = circles.select(order[start : start + _PART])
         tried = _Outermost.of(part, radii)
-        for number, kind in enumerate(kinds):
-            better = tried.better(*kind)
+        for number, better in enumerate(tried.better(kinds)):
             for octave, of_octave in enumerate(found):
                 some = np.flatnonzero((better != 0) & (tried.octave == octave))
                 frames = frame.scaled(part.frames[tried.circle[some]], tried.factor[some])
