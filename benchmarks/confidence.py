@@ -57,7 +57,7 @@ from ahf_ros.vision.pyramid import image_pyramid
 from benchmarks import report
 from support.pictures.conditions import COMMON, FIRST, FOREIGN, MAKERS, Scene, pictures, scenes
 from support.pictures.dot_conditions import dots_scenes, gsi_scenes, with_covered_dots
-from support.pictures.textures import lookalikes, rough_image, text_page
+from support.pictures.textures import lookalikes, rough_image, text_page, weave
 
 NEAR = 5.0
 """Largest distance of a target from its truth, px."""
@@ -72,10 +72,13 @@ COVERED_DOTS = 2
 """Targets of GSI in a scene that lack a decoding dot."""
 
 TEXTURES = 6
-"""Textured images of a seed, and pages of text, which show no target of GSI."""
+"""Textured images of a seed, pages of text, and woven fibre, which show no target of GSI."""
 
-SIGNS = np.array([1, 1, -1, -1, -1, -1])
-"""Of GSI's weights: support and margin speak for a target, all else against one."""
+NO_TARGETS = 'no targets'
+"""Condition of pictures that show none of GSI."""
+
+SIGNS = np.array([-1, 1, -1, -1, 1, -1, -1])
+"""Of GSI's weights: margin and edges in place speak for a target, all else against one."""
 
 STATED, ALLOWED = (0.5, 0.7, 0.9, 0.97, 1.0), 0.03
 """Classes of confidence in the diagram, and by how much their shares may be away."""
@@ -271,14 +274,20 @@ def gsi_readings(seed: int) -> Parts:
         for condition, settings in gsi_scenes(seed, Path(folder)):
             features, right = _gsi_hypotheses(render(settings))
             yield np.full(len(right), condition), features, right
-    for number, draw in product(range(TEXTURES), (rough_image, text_page)):
+    for number, draw in product(range(TEXTURES), (rough_image, text_page, weave)):
         features = _found_in(draw(100 * seed + number)).features
-        yield np.full(len(features), 'no targets'), features, np.zeros(len(features), bool)
+        yield np.full(len(features), NO_TARGETS), features, np.zeros(len(features), bool)
 
 
-def fitted_to_gsi(_: np.ndarray, features: np.ndarray, right: np.ndarray) -> dict[str, np.ndarray]:
-    """Return the weights of GSI's targets, of which the first one is the intercept."""
-    intercept, slopes = rising_regression(SIGNS * features, right, np.ones(len(right)))
+def fitted_to_gsi(
+    condition: np.ndarray, features: np.ndarray, right: np.ndarray
+) -> dict[str, np.ndarray]:
+    """Return the weights of GSI's targets, of which the first one is the intercept.
+
+    Pictures made of what resembles dots are rare.
+    """
+    counts = np.where(condition == NO_TARGETS, RARE, 1.0)
+    intercept, slopes = rising_regression(SIGNS * features, right, counts)
     return {'weights': np.round(np.append(intercept, SIGNS * slopes), 3) + 0.0}
 
 

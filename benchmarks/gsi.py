@@ -30,7 +30,7 @@ from benchmarks.report import number, table
 from benchmarks.rows import Case, Row, Scene, detector, measured, rendered
 from benchmarks.speed import in_turns
 from support import PHOTOS
-from support.pictures.textures import dot_grid, rough_image, text_page
+from support.pictures.textures import dot_grid, rough_image, text_page, weave
 
 PAPER = SceneSettings(
     family='gsi',
@@ -71,6 +71,7 @@ def without_targets() -> Iterator[Case]:
         yield case(f'texture {count}', partial(_drawn, rough_image, count))
     for count in range(4):
         yield case(f'page of print {count}', partial(_drawn, text_page, count))
+        yield case(f'woven fibre {count}', partial(_drawn, weave, count))
     for path in sorted((PHOTOS / 'panel').glob('*.png')):
         yield case(f'photograph {path.stem}', partial(_photograph, path))
 

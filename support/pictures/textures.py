@@ -53,6 +53,32 @@ def text_page(seed: int) -> np.ndarray:
     return _clipped(blurred + generator.normal(0, 2, page.shape))
 
 
+def weave(seed: int) -> np.ndarray:
+    """Return 1600 x 1200 px of woven carbon fibre in a flash, with threads like small dots."""
+    generator = np.random.default_rng(seed)
+    height, width = 1200, 1600
+    period, lean = generator.uniform(6, 12), generator.uniform(0.3, 0.9)
+    rows, columns = np.mgrid[: int(3 * height / period), : int(3 * width / period)]
+    places = np.stack([columns + lean * rows, rows * generator.uniform(0.7, 1.3)], axis=-1)
+    turn = generator.uniform(0, np.pi)
+    turned = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
+    places = period * (places - places.mean(axis=(0, 1))).reshape(-1, 2) @ turned
+    places += generator.normal((width / 2, height / 2), 0.06 * period, places.shape)
+    inside = ((places > 0) & (places < (width - 1, height - 1))).all(axis=1)
+    x, y = np.rint(places[inside]).astype(int).T
+    cloth = np.zeros((height, width))
+    cloth[y, x] = generator.gamma(4, 0.25, len(x))
+    narrow, long = period * generator.uniform(0.1, 0.2), period * generator.uniform(0.2, 0.35)
+    lying = cv2.getRotationMatrix2D((16, 16), float(generator.uniform(0, 180)), 1)
+    along, across = (np.exp(-0.5 * ((np.arange(33) - 16) / of) ** 2) for of in (long, narrow))
+    thread = cv2.warpAffine(np.outer(across, along), lying, (33, 33))
+    cloth = cv2.filter2D(cloth, -1, thread)
+    down, right = np.mgrid[:height, :width]
+    flash = np.hypot(right - generator.uniform(0, width), down - generator.uniform(0, height))
+    light = generator.uniform(10, 60) + generator.uniform(0, 600) * np.exp(-flash / 250)
+    return _clipped(3 + light * (0.08 + cloth) + generator.normal(0, 1, cloth.shape))
+
+
 def dot_grid(seed: int) -> np.ndarray:
     """Return an image of a regular grid of 2,000 dots, slightly turned and foreshortened."""
     generator = np.random.default_rng(seed)

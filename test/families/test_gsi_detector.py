@@ -15,7 +15,7 @@ from ahf_ros.scenes.scene import Rendering
 from ahf_ros.views.drawing.overlay import DECODED_COLOUR, DECODING_DOT_COLOUR, draw
 from ahf_ros.vision.homography import fit_homographies
 from ahf_ros.vision.pyramid import image_pyramid
-from support.pictures.textures import text_page
+from support.pictures.textures import text_page, weave
 from support.scenes import around, counted, errors, relative_errors, rendering
 
 SIZE = {'family': 'gsi', 'width': 1000, 'height': 700, 'targets': 4, 'dot_radius': 6.0, 'seed': 3}
@@ -30,6 +30,12 @@ def scene(**changes: object) -> Rendering:
 @pytest.mark.parametrize('seed', [101, 102, 103])
 def test_letters_are_no_dots(seed: int) -> None:
     assert detect(text_page(seed)) == []
+
+
+@pytest.mark.lasting
+@pytest.mark.parametrize('seed', [101, 102, 103])
+def test_threads_are_no_dots(seed: int) -> None:
+    assert detect(weave(seed)) == []
 
 
 @pytest.mark.lasting

@@ -33,6 +33,7 @@ from ahf_ros.families.gsi.hypotheses import (
     least_support,
     plausible,
     resolve,
+    strays,
 )
 from ahf_ros.families.gsi.refinement import (
     Placement,
@@ -172,16 +173,18 @@ def read_targets(
             certain = known.polarity[resolve(known, code)]
             if len(certain) and not np.isin(certain, dots.polarity[which]).any():
                 continue
-        templates = find_templates(dots.select(which), code, obvious=obvious)
+        some = dots.select(which)
+        templates = find_templates(some, code, obvious=obvious)
         if not len(templates.polarity):
             continue
-        read = _read(pyramid, templates, code, expected, obvious=obvious)
+        read = _read(pyramid, some, templates, code, expected, obvious=obvious)
         known = Hypotheses.joined([known, read])
     return known
 
 
 def _read(
     pyramid: ImagePyramid,
+    dots: Dots,
     templates: Templates,
     code: PointPrint,
     expected: frozenset[int],
@@ -197,16 +200,17 @@ def _read(
     if not len(which):
         return NO_HYPOTHESES
     words = readings.words[which]
-    first = _placed(pyramid, templates.select(which), words, code, expected)
+    first = _placed(pyramid, dots, templates.select(which), words, code, expected)
     again = np.flatnonzero((first.words != words) & (first.support >= _PROMISING))
     if not len(again):
         return first
     found = first.select(again)
-    return first.replaced(again, _placed(pyramid, found, found.words, code, expected))
+    return first.replaced(again, _placed(pyramid, dots, found, found.words, code, expected))
 
 
 def _placed(
     pyramid: ImagePyramid,
+    dots: Dots,
     groups: Templates | Hypotheses,
     words: np.ndarray,
     code: PointPrint,
@@ -220,6 +224,7 @@ def _placed(
         pyramid.logs[0], placement.homographies, polarity, placement.scale, code
     )
     readings = read_codes(evidence, placement.scale, code, expected)
+    stray = strays(dots, placement, *_printed(readings.words, code, placement.scale), code)
     return Hypotheses(
         homographies=placement.homographies,
         covariance=placement.covariance,
@@ -227,7 +232,7 @@ def _placed(
         scale=placement.scale,
         growth=placement.growth,
         words=readings.words,
-        features=confidence_features(placement, readings, code),
+        features=confidence_features(placement, readings, stray, code),
     )
 
 

@@ -17,7 +17,8 @@ from ahf_ros.families.gsi.grouping import Templates
 from ahf_ros.families.gsi.refinement import Placement
 from ahf_ros.prints.gsi import PointPrint
 from ahf_ros.vision.array_record import ArrayRecord
-from ahf_ros.vision.frame import ellipse_axes
+from ahf_ros.vision.dots import Dots
+from ahf_ros.vision.frame import mean_radii, project
 from ahf_ros.vision.homography import reference_frames
 from ahf_ros.vision.logistic import logistic, read_weights
 
@@ -27,9 +28,11 @@ OBVIOUS = 0.95  # confidence from which a target is not weighed against others i
 POSSIBLE = 0.1  # confidence from which a target is reported without its ID, where these are
 SAME = 0.4  # distance of the reference points of the same target in its reach
 
-_UNEVEN = (0.005, 0.05)  # difference of radii that counts as 1, in ln: of any dot, and in px
 _PERSPECTIVE = 0.08  # change of depth from the centre to the edge of a target, that counts as 1
-_MAXIMUM = 6.0  # of both
+
+_ALIKE = 0.7  # difference of ln of the radii of dots that are about as large
+_OWN = 1.5  # radii of its dots, within which a dot is one of a target's
+_PART = 64  # targets at a time, which bounds the memory
 
 _PLAUSIBLE = 0.75  # support of a hypothesis that is followed up
 _CLEAR = 0.95  # the same, where only obvious targets are looked for; these have 1
@@ -58,7 +61,7 @@ class Hypotheses(ArrayRecord):
         Growth of what is dark in light, px; NaN where it was not measured.
     words : ndarray of int64, shape (k,)
         Value of the code.
-    features : ndarray of float64, shape (k, 6)
+    features : ndarray of float64, shape (k, 7)
         See `confidence_features`.
     """
 
@@ -72,8 +75,8 @@ class Hypotheses(ArrayRecord):
 
     @property
     def support(self) -> np.ndarray:
-        """Support of the code, as in `Readings`, shape (k,)."""
-        return self.features[:, 0]
+        """Support of the code, as in `Readings`, up to 1, shape (k,)."""
+        return 1 - self.features[:, 0] ** 2
 
     @property
     def confidence(self) -> np.ndarray:
@@ -92,29 +95,59 @@ NO_HYPOTHESES = Hypotheses(
 )
 
 
+def strays(
+    dots: Dots, placement: Placement, places: np.ndarray, radii: np.ndarray, family: PointPrint
+) -> np.ndarray:
+    """Return how many dots of about their size targets have among them, of their own, shape (k,).
+
+    Light draws some into a target, but a weave or a page has as many of them everywhere.
+
+    Parameters
+    ----------
+    dots : Dots
+        All of the polarity of k targets.
+    placement : Placement
+        Of these targets.
+    places, radii : ndarray of float64, shape (k, n, 2) and (k, n)
+        Of their own dots, in the plane of the printed design and of its size in the image.
+    family : PointPrint
+    """
+    centres, size = dots.frames[:, :2, 2], np.log(mean_radii(dots.frames))
+    count = np.zeros(len(radii))
+    for start in range(0, len(radii), _PART):
+        part = slice(start, start + _PART)
+        frames, own = placement.homographies[part], radii[part]
+        usual = np.log(mean_radii(reference_frames(frames, 1.0)) * own.mean(axis=1))
+        seen = project(np.linalg.inv(frames), centres)
+        within = (seen**2).sum(axis=2) < family.reach**2
+        target, dot = np.nonzero(within & (np.abs(size - usual[:, None]) < _ALIKE))
+        away = np.hypot(*(seen[target, dot, None] - places[part][target]).transpose(2, 0, 1))
+        stray = (away > _OWN * own[target]).all(axis=1)
+        count[part] = np.bincount(target[stray], minlength=len(own))
+    return count / radii.shape[1]
+
+
 def confidence_features(
-    placement: Placement, readings: Readings, family: PointPrint
+    placement: Placement, readings: Readings, stray: np.ndarray, family: PointPrint
 ) -> np.ndarray:
     """Return what tells targets from chance arrangements, and right codes from wrong ones.
 
-    Support and margin of the reading at the places of the placement; the roots of the
-    misplacement, of the differences of the radii of dots, up to a bound, and of the share of the
-    dots of some size whose edges are not where they should be, as the first of these says most;
-    and the perspective, up to a bound, shape (k, 6).
+    The margin of the reading at the places of the placement; the roots of what its support lacks,
+    of the misplacement, of the share of the dots of some size whose edges are not where they
+    should be, and of the strays, as the first of these says most; the share of all dots whose
+    edges are there, as nothing is misplaced where none was measured; and the perspective,
+    shape (k, 7).
     """
-    radius = float(family.template_radii[family.reference])
-    minor = ellipse_axes(reference_frames(placement.homographies, radius))[1] * placement.scale
-    always, of_pixel = _UNEVEN
-    uneven = placement.unevenness / (always + of_pixel / np.maximum(minor, 0.1))
     perspective = placement.homographies[:, 2, :2] * family.reach / _PERSPECTIVE
     return np.stack(
         [
-            readings.support,
+            np.sqrt(np.maximum(1 - readings.support, 0)),
             readings.margin,
             np.sqrt(placement.misplacement),
-            np.sqrt(np.minimum(uneven, _MAXIMUM)),
             np.sqrt(placement.missing),
-            np.minimum(np.hypot(*perspective.T), _MAXIMUM),
+            placement.share,
+            np.hypot(*perspective.T),
+            np.sqrt(stray),
         ],
         axis=1,
     )

@@ -50,8 +50,6 @@ class Placement:
         the homography and the usual one, s.
     scale : ndarray of float64, shape (k,)
         Usual radius of the dots in that of the printed design.
-    unevenness : ndarray of float64, shape (k,)
-        Usual difference of a radius from that, in ln.
     growth : ndarray of float64, shape (k,)
         Growth of what is dark in light, by the radii of the dots, px.
     """
@@ -62,7 +60,6 @@ class Placement:
     missing: np.ndarray
     misplacement: np.ndarray
     scale: np.ndarray
-    unevenness: np.ndarray
     growth: np.ndarray
 
 
@@ -188,7 +185,6 @@ def place_targets(
     usual_distance = _USUAL[0] + _USUAL[1] * np.exp(size)
     distance = np.hypot(*np.moveaxis(fitted - shift - expected, 2, 0)) / usual_distance
     misplaced = np.sort(np.where(found, np.log1p(distance**2), 0.0), axis=1)[:, :-1]
-    uneven = median(np.abs(growth - np.log(scale)[:, None]), measured)
     of_dots = polarity[:, None] * implied.reshape(shape) * np.expm1(growth)
     of_dots += dots.growth.reshape(shape)
     return Placement(
@@ -198,7 +194,6 @@ def place_targets(
         missing=(clear & ~near).sum(axis=1) / np.maximum(clear.sum(axis=1), 1),
         misplacement=misplaced.sum(axis=1),
         scale=scale,
-        unevenness=uneven,
         growth=np.where(found.any(axis=1), median(of_dots, found), np.nan),
     )
 
