@@ -3,14 +3,16 @@
 What a detector takes for a target may be a part of another one: the dot of a ring may be one dot
 of many. A place belongs to one target, the surer one, of equally sure ones the larger. Where all
 families are looked for and one detector finds targets of its own beyond doubt, the next ones look
-at an image in which these are painted over, which takes them a fraction of the time; those that
-search for dots do not where the first one left none that its targets do not explain.
+at an image in which these are painted over, which takes them a fraction of the time. Dots that
+were found beside them are not looked for again, and those that search for dots do not look at all
+where the first one left none that its targets do not explain.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from math import hypot
 from typing import ClassVar
 
@@ -111,6 +113,7 @@ class SeveralDetector:
         """Return the targets of each detector; those that search for dots do so together."""
         check_image(image)
         shared = sum(isinstance(it, Searching) for it in self.parts) > 1
+        common = CommonSearch(self.settings.radii[0], self.settings.polarities)
         pyramid: ImagePyramid | None = None
         dots: np.ndarray | None = None  # that no target explains, once these are known
         results: list[list[Target]] = []
@@ -124,7 +127,7 @@ class SeveralDetector:
             if shared and isinstance(part, Searching):
                 if pyramid and pyramid.contrast != part.contrast:
                     pyramid = None  # before there is another one: it takes much memory
-                pyramid = pyramid or self._pyramid(left, part.contrast)
+                pyramid = pyramid or self._pyramid(left, part.contrast, common)
             if pyramid and isinstance(part, Explaining):
                 found, dots = part.explain(pyramid)
                 dots = None if self.settings.report_undecoded else dots
@@ -136,16 +139,15 @@ class SeveralDetector:
             if self.family == AUTO and is_clear(found):
                 known = [it for it in found if it.id != UNDECODED]
                 left, pyramid = without_targets(left, known, self.settings.prints), None
-                dots = dots if dots is None else _beside(dots, known, self.settings.prints)
+                beside = partial(_beside, targets=known, prints=self.settings.prints)
+                common = common.select(beside)
+                dots = dots if dots is None else dots[beside(dots)]
         return results
 
-    def _pyramid(self, image: np.ndarray, contrast: int) -> ImagePyramid:
+    def _pyramid(self, image: np.ndarray, contrast: int, common: CommonSearch) -> ImagePyramid:
         """Return the pyramid of an image, which all detectors share at its own contrast."""
         pyramid = image_pyramid(as_gray(image), self.settings.max_radius, contrast)
-        if contrast > 1:
-            return pyramid
-        common = CommonSearch(self.settings.radii[0], self.settings.polarities)
-        return replace(pyramid, common=common)
+        return pyramid if contrast > 1 else replace(pyramid, common=common)
 
     def _merged(self, results: Sequence[Sequence[Target]]) -> list[Target]:
         """Return the targets of all detectors that own their places."""
@@ -184,10 +186,10 @@ class SeveralDetector:
 
 
 def _beside(dots: np.ndarray, targets: Sequence[Target], prints: Prints) -> np.ndarray:
-    """Return the frames of dots, shape (k, 3, 3), whose centres are on none of some targets."""
+    """Return which dots, by their frames (k, 3, 3), have their centres on none of some targets."""
     x, y, reach = np.array([(it.x, it.y, _radius(it, prints)) for it in targets]).T
     away = np.hypot(dots[:, :1, 2] - x, dots[:, 1, 2, None] - y)
-    return dots[(away >= reach).all(axis=1)]
+    return np.asarray((away >= reach).all(axis=1))
 
 
 def _radius(target: Target, prints: Prints) -> float:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -36,6 +36,11 @@ class CommonSearch:
     min_radius: float
     polarities: Sequence[int]
     found: dict[str, Dots] = field(default_factory=dict)
+
+    def select(self, which: Callable[[np.ndarray], np.ndarray]) -> CommonSearch:
+        """Return the search with some of its dots, by a mask (k,) of their frames (k, 3, 3)."""
+        found = {way: dots.select(which(dots.frames)) for way, dots in self.found.items()}
+        return replace(self, found=found)
 
 
 def dots_in_common(
