@@ -66,13 +66,13 @@ def weave(seed: int) -> np.ndarray:
     places += generator.normal((width / 2, height / 2), 0.06 * period, places.shape)
     inside = ((places > 0) & (places < (width - 1, height - 1))).all(axis=1)
     x, y = np.rint(places[inside]).astype(int).T
-    cloth = np.zeros((height, width))
-    cloth[y, x] = generator.gamma(4, 0.25, len(x))
+    points = np.zeros((height, width))
+    points[y, x] = generator.gamma(4, 0.25, len(x))
     narrow, long = period * generator.uniform(0.1, 0.2), period * generator.uniform(0.2, 0.35)
     lying = cv2.getRotationMatrix2D((16, 16), float(generator.uniform(0, 180)), 1)
     along, across = (np.exp(-0.5 * ((np.arange(33) - 16) / of) ** 2) for of in (long, narrow))
     thread = cv2.warpAffine(np.outer(across, along), lying, (33, 33))
-    cloth = cv2.filter2D(cloth, -1, thread)
+    cloth = cv2.filter2D(points, -1, thread)
     down, right = np.mgrid[:height, :width]
     flash = np.hypot(right - generator.uniform(0, width), down - generator.uniform(0, height))
     light = generator.uniform(10, 60) + generator.uniform(0, 600) * np.exp(-flash / 250)
