@@ -84,7 +84,14 @@ static inline float value_of(count h, count w, const float image[h][w], const pl
     return over + at->down[a] * (under - over);
 }
 
-/* The values of an image of whole numbers at n places. */
+/* The nearest whole number of parts. */
+static inline float rounded(float value, float parts)
+{
+    return (float)(int32_t)(value * parts + (value < 0 ? -0.5f : 0.5f)) / parts;
+}
+
+/* The values of an image of whole numbers at n places, which are such numbers themselves. Places are
+   those of 32 in a pixel, as in cv2.remap, which samples the same images elsewhere. */
 static inline void shorts_of(count h, count w, const int16_t image[h][w], const places *at, count n,
                              float values[n])
 {
@@ -95,9 +102,10 @@ static inline void shorts_of(count h, count w, const int16_t image[h][w], const 
         near[2][a] = image[low][left], near[3][a] = image[low][right];
     }
     for (count a = 0; a < n; a++) {
-        float over = (float)near[0][a] + at->across[a] * (float)(near[1][a] - near[0][a]);
-        float under = (float)near[2][a] + at->across[a] * (float)(near[3][a] - near[2][a]);
-        values[a] = over + at->down[a] * (under - over);
+        float across = rounded(at->across[a], 32), down = rounded(at->down[a], 32);
+        float over = (float)near[0][a] + across * (float)(near[1][a] - near[0][a]);
+        float under = (float)near[2][a] + across * (float)(near[3][a] - near[2][a]);
+        values[a] = rounded(over + down * (under - over), 1);
     }
 }
 

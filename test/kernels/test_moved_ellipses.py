@@ -17,14 +17,20 @@ def rays(count: int) -> np.ndarray:
     return np.array([np.cos(angles), np.sin(angles)])
 
 
-def at(image: np.ndarray, x: float, y: float) -> float:
-    """Return the value between pixels, of the nearest one beyond the border."""
+def at(image: np.ndarray, frame: np.ndarray, ray: np.ndarray, radius: float) -> float:
+    """Return the value on a circle of a target, of the nearest pixel beyond the border.
+
+    As in `cv2.remap`, places are those of 32 in a pixel, and values are whole numbers.
+    """
     height, width = image.shape
-    x, y = min(max(x, 0), width - 1), min(max(y, 0), height - 1)
+    along = (frame[:, 0] * ray[0] + frame[:, 1] * ray[1]).astype(np.float32)
+    x, y, scale = along * np.float32(radius) + frame[:, 2].astype(np.float32)
+    x, y = min(max(x / scale, 0), width - 1), min(max(y / scale, 0), height - 1)
     left, top = min(int(x), max(width - 2, 0)), min(int(y), max(height - 2, 0))
+    across, down = (np.floor((of - first) * 32 + 0.5) / 32 for of, first in ((x, left), (y, top)))
     part = image[top : top + 2, left : left + 2].astype(float)
-    rows = [row[0] + (x - left) * (row[-1] - row[0]) for row in part]
-    return float(rows[0] + (y - top) * (rows[-1] - rows[0]))
+    over, under = (row[0] + across * (row[-1] - row[0]) for row in part[[0, -1]])
+    return float(np.floor(over + down * (under - over) + 0.5))
 
 
 def dots(seed: int, shape: tuple[int, int]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -44,13 +50,15 @@ def edge(
     log: np.ndarray, frame: np.ndarray, ray: np.ndarray, scale: float, gray: bool
 ) -> tuple[float, float, float]:
     """Return how far the strongest step is outside, this step, and half of the window."""
-    half = min(max(2 / np.sqrt(abs(np.linalg.det(frame[:2, :2]))), 0.3), 0.5)
-    points = [frame @ [*((1 + place * half) * ray), 1] for place in PLACES]
-    values = np.array([at(log, x, y) for x, y, _ in points])
+    size = np.sqrt(abs(frame[0, 0] * frame[1, 1] - frame[0, 1] * frame[1, 0]))
+    half = min(max(2 / size, 0.3), 0.5)
+    values = np.array([at(log, frame, ray, 1 + place * half) for place in PLACES])
     if gray:
         values = np.exp((values - values.max()) / UNIT)
-    steps = np.clip((values[2:] - values[:-2]) * scale, *((-1, 1) if gray else COUNTED))
-    best = min(max(int(steps.astype(np.float32).argmax()), 1), len(steps) - 2)
+    values = values.astype(np.float32)  # so that equal steps are equal, and thresholds the same
+    steps = (values[2:] - values[:-2]) * np.float32(scale)
+    steps = np.clip(steps, *np.float32((-1, 1) if gray else COUNTED)).astype(float)
+    best = min(max(int(steps.argmax()), 1), len(steps) - 2)
     before, step, after = steps[best - 1 : best + 2]
     shift = 0.5 * (before - after) / min(before - 2 * step + after, FLAT)
     shift = min(max(shift, -1), 1) * (PLACES[1] - PLACES[0])
@@ -73,8 +81,9 @@ def test_the_best_of_all_outlines_and_sizes_is_found(seed: int, shape: tuple[int
     ):
         of_all = np.full((5, 20), -1.0)
         steps = np.zeros((24, 20))
-        for j, (across, down) in enumerate(rays(24).T):
-            seen = np.array([at(log, x + radius * across, y + radius * down) for radius in radii])
+        frame = np.array([[1, 0, x], [0, 1, y], [0, 0, 1]])
+        for j, ray in enumerate(rays(24).T):
+            seen = np.array([at(log, frame, ray, radius) for radius in radii])
             steps[j] = np.clip((seen[2:] - seen[:-2]) * sign, *COUNTED)
         for i, a in np.ndindex(of_all.shape):
             distance = np.abs(outlines[i, :, None] + a - np.arange(20))
