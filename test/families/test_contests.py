@@ -23,6 +23,7 @@ def hypotheses(places: list[float], odds: list[float]) -> Hypotheses:
         Hypotheses.unread(made_up(places, radius=RADIUS), CODE),
         words=np.full(count, 71),
         marked=np.array(odds, float),
+        seen=np.array(odds, float),
         confidence=np.ones(count),
     )
 
@@ -54,6 +55,22 @@ def test_readings_that_contradict_each_other(
     places: Any, odds: list[int], ids: list[int], confidence: Any, kept: list[int], certain: Any
 ) -> None:
     assert resolved(places, odds, ids, confidence) == (kept, certain)
+
+
+@pytest.mark.parametrize(
+    ('seen', 'marked', 'leads'),
+    [
+        ((156, 108), (156, 346), True),
+        ((61, 59), (712, 301), True),
+        ((250, 253), (1415, 1440), False),
+    ],
+)
+def test_of_two_readings_of_a_dot_only_one_may_know_its_levels(
+    seen: tuple[int, int], marked: tuple[int, int], leads: bool
+) -> None:
+    """As measured in pictures; the surer one of the last two, which is covered, is wrong."""
+    found = replace(hypotheses(ONE_DOT, seen), marked=np.array(marked, float))
+    assert resolve(found, np.array([1, 2]))[1].tolist() == [leads, False]
 
 
 def test_of_two_claims_to_an_id_the_clearly_surer_one_stays() -> None:

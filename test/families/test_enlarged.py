@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from ahf_ros.families import DetectorSettings, create_detector
+from ahf_ros.families.ring.contests import resolve
 from ahf_ros.families.ring.decoding import DOUBT
 from ahf_ros.families.ring.detector import find_hypotheses
 from ahf_ros.families.ring.hypotheses import Hypotheses
@@ -23,12 +24,13 @@ def resized(image: np.ndarray, factor: float) -> np.ndarray:
 
 
 def readings(image: np.ndarray) -> dict[int, Hypotheses]:
-    """Return the surest certain reading of each ID."""
+    """Return the certain reading of each ID that no other reading of its dot contests."""
     found = find_hypotheses(image, SETTINGS)
     found = found.select(found.certain)
-    found = found.select(np.argsort(found.confidence, kind='stable'))
+    found = found.select(np.argsort(-found.confidence, kind='stable'))
     _, ids = canonical(found.words, family(SETTINGS.family))
-    return {number: found.select([index]) for index, number in enumerate(ids.tolist())}
+    _, certain = resolve(found, ids)
+    return {int(ids[index]): found.select([index]) for index in np.flatnonzero(certain)}
 
 
 @pytest.mark.parametrize(

@@ -84,16 +84,22 @@ def resolve(hypotheses: Hypotheses, ids: np.ndarray) -> tuple[np.ndarray, np.nda
     They come in the order of their confidence; `ids` are equal where words are the same. The best
     one of a dot is kept. Dots on the band of a certain target are its sectors and are dropped.
     Certain stays what neither another reading of its dot, nor a target whose band overlaps, nor
-    another claim to its ID comes near to.
+    another claim to its ID comes near to. Readings of a dot are compared against anything and
+    against bare paper: where only one of them knows the levels of dot and paper, the latter of its
+    log odds are much larger, whichever is right.
     """
-    marked, order = hypotheses.marked, np.arange(len(ids))
+    order = np.arange(len(ids))
     on_it = on_targets(hypotheses, hypotheses.certain)
 
     def against(index: int) -> np.ndarray:
         return on_it(index) & (ids != ids[index]) & (order > index)
 
     kept = owners(len(ids), on_it)
-    certain = kept & leading(marked, hypotheses.certain, against, _CLEARLY, CLEAR)
+    ahead = (
+        leading(odds, hypotheses.certain, against, _CLEARLY, CLEAR)
+        for odds in (hypotheses.seen, hypotheses.marked)
+    )
+    certain = kept & np.any([*ahead], axis=0)
     sure = 1 / (1 - hypotheses.confidence + np.finfo(float).eps)
     certain = surer(sure, certain, overlapping(hypotheses))
     return kept, sole_owners(hypotheses.confidence, certain, lambda index: ids == ids[index])
