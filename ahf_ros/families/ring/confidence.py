@@ -34,13 +34,15 @@ _OF_MARGIN = np.array([-1.0, 1.0])  # one or two log odds leave a doubt
 
 
 def features(read: Hypotheses) -> np.ndarray:
-    """Return what speaks for readings, float64, shape (k, 7).
+    """Return what speaks for readings, float64, shape (k, 8).
 
     Logarithm of the log odds of words against the next ID; root of the log odds of arcs of ink of
     any length against them, negative; the shares that are missing of the expected edges, and of
     the evidence of a typical target of this size in this light, negative; how easily bare paper
     shows the word, negative; how easily spots of light show it, where light is uneven, negative;
-    the share of sectors that look like another print, beyond what covers explain, negative.
+    the share of sectors that look like another print, beyond what covers explain, negative; the
+    evidence of the outer edges of marks, as a share of that typical evidence, where it speaks
+    against them: spots of a lattice about a spot show a word, but reach beyond its band.
     """
     uneven = np.isnan(read.unlike)
     seen = np.maximum(read.seen, 0) / np.maximum(read.typical, _LITTLE)
@@ -53,6 +55,7 @@ def features(read: Hypotheses) -> np.ndarray:
             -np.exp(-np.maximum(read.marked, 0) / _of_bare_paper(read)),
             -np.exp(1 - _spots(read)) * uneven,
             np.where(uneven, 0, np.minimum(COVERED - read.unlike, 0)),
+            np.clip(read.outer / np.maximum(read.typical, _LITTLE), -1, 0),
         ],
         axis=1,
     )
@@ -90,5 +93,5 @@ def confidence(values: np.ndarray) -> np.ndarray:
 
 
 def target_probability(values: np.ndarray) -> np.ndarray:
-    """Return the probabilities that readings are of targets, shape (k,), values (k, 7)."""
+    """Return the probabilities that readings are of targets, shape (k,), values (k, 8)."""
     return logistic(values, _OF_TARGET)

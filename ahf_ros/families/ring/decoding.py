@@ -75,6 +75,8 @@ class Words(ArrayRecord):
     unlike : ndarray of float64, shape (k,)
         Share of sectors in which targets are not what their words print, see `appearance`; NaN
         where light is uneven.
+    outer : ndarray of float64, shape (k,)
+        Evidence of the outer edges of marks, negative where most marks do not end there.
     hidden : ndarray of bool, shape (k, m)
         Where something covers the band.
     """
@@ -90,6 +92,7 @@ class Words(ArrayRecord):
     seen: np.ndarray
     typical: np.ndarray
     unlike: np.ndarray
+    outer: np.ndarray
     hidden: np.ndarray
 
     def as_they_look(self) -> Words:
@@ -111,6 +114,7 @@ class Words(ArrayRecord):
             seen=np.zeros(count),
             typical=np.zeros(count),
             unlike=np.zeros(count),
+            outer=np.zeros(count),
             hidden=np.zeros((count, angles), bool),
         )
 
@@ -183,6 +187,7 @@ def decode(
         seen=score,
         typical=_typical(bands.some, inked, hidden),
         unlike=np.zeros(len(read)),
+        outer=np.where(inked & ~hidden, evidence.ink[:, 1], 0).sum(axis=1, dtype=np.float64),
         hidden=hidden,
     )
     return decoded.replaced(read, found)

@@ -45,7 +45,7 @@ class Hypotheses(ArrayRecord):
         In the rotation read; 0 where there is none.
     starts : ndarray of float64, shape (k,)
         Where in the frame the sector of the lowest bit starts, rad counter-clockwise from +x.
-    margin, marked, coded, seen, typical, unlike : ndarray of float64, shape (k,)
+    margin, marked, coded, seen, typical, unlike, outer : ndarray of float64, shape (k,)
         Log odds of the word and looks of its print, see `ahf_ros.families.ring.decoding.Words`.
     hidden : ndarray of float64, shape (k,)
         Share of the band that something covers.
@@ -71,6 +71,7 @@ class Hypotheses(ArrayRecord):
     seen: np.ndarray
     typical: np.ndarray
     unlike: np.ndarray
+    outer: np.ndarray
     hidden: np.ndarray
     families: np.ndarray
     confidence: np.ndarray
@@ -123,6 +124,7 @@ class Hypotheses(ArrayRecord):
             seen=words.seen,
             typical=words.typical,
             unlike=words.unlike,
+            outer=words.outer,
             hidden=words.hidden.mean(axis=1),
             families=np.full(len(words.words), family, object),
             confidence=np.zeros(len(words.words)),

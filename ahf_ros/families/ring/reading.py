@@ -194,7 +194,8 @@ def _settled(
     hidden = of_all.hidden | (polar.reach < of_band[0])
     # What speaks against no target is that of edges, so that all targets compare.
     of_edges = words.select(some)
-    of_all = replace(of_all, seen=of_edges.seen, typical=of_edges.typical, hidden=hidden)
+    seen = {name: getattr(of_edges, name) for name in ('seen', 'typical', 'outer')}
+    of_all = replace(of_all, hidden=hidden, **seen)
     return words.replaced(some, of_all)
 
 

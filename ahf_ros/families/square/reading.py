@@ -37,7 +37,6 @@ _CORNER = 0.3  # from a corner of the border, in cells
 _BLURS = 0.7, 0.4  # of a usual image and of a sharp one, standard deviations in px
 _SMALL_CELL = 2.0  # below which they differ, px
 _SMALLEST_CELL = 1.0  # that can be read, px
-_LARGE_CELL = 4.0  # whose middle stays dark where light spreads over ink, px
 _SPREADS = 3.0  # logarithmic odds against an image in which it does
 _MOST_MIXED = 0.2  # share that a cell takes from each neighbour, at most
 _REACH = 0.25  # standard deviation of the window that levels are taken from, in sides
@@ -219,14 +218,14 @@ def _evidence(
 ) -> _Evidence:
     """Return what the cells of quadrilaterals within a border say.
 
-    Those with small cells are there twice, once as in a sharp image, and those with large cells
-    once by the darkest part of each, as where light has spread from paper over ink.
+    All are there twice, once by the darkest part of each cell, as where light has spread from paper
+    over ink; those with small cells once more, as in a sharp image.
     """
     side = cells + 2 * border
     small = np.flatnonzero(sizes < _SMALL_CELL * side)
-    large = np.flatnonzero(sizes >= _LARGE_CELL * side)
-    tried = np.concatenate([np.arange(len(frames)), small, large])
-    counts = len(frames), len(small), len(large)
+    every = np.arange(len(frames))
+    tried = np.concatenate([every, small, every])
+    counts = len(every), len(small), len(every)
     blurs = np.repeat([*_BLURS, _BLURS[0]], counts)
     spread = np.repeat([False, False, True], counts)
     lengths = side_lengths(corners[tried]) / side
