@@ -119,10 +119,31 @@ static struct pair pair_at(count s, const double level[s][s], int side, count j)
     }
 }
 
+/* Half of a step from ink to paper, and the step. */
+struct step {
+    double half, whole;
+};
+
+/* The step from the brightest ink of a border to the darkest paper, 0 where light is the same all
+   round, or changes nearly as much as ink does. */
+static struct step least_step(count s, const double level[s][s], double usual, double minimum_step)
+{
+    struct pair most = {-INFINITY, -INFINITY}, least = {INFINITY, INFINITY};
+    for (int side = 0; side < SIDES; side++)
+        for (count j = 2; j < s - 2; j++) { /* corners may be round */
+            struct pair of = pair_at(s, level, side, j);
+            most.ink = greater(most.ink, of.ink), least.ink = lesser(least.ink, of.ink);
+            least.paper = lesser(least.paper, of.paper);
+        }
+    double step = least.paper - most.ink;
+    bool used = most.ink - least.ink > usual / 2 && step > minimum_step / 2;
+    return (struct step){(most.ink + least.paper) / 2, used ? step : 0};
+}
+
 /* Set sums over steps of the border, for each line; whether all sides have enough of these. */
 static bool set_sums(count s, const double level[s][s], const double window[s],
                      double minimum_step, double of_usual, double share, double steps[SIDES * s],
-                     double sums[SIDES + 2][SUMS][s], double all[SUMS])
+                     double sums[SIDES + 2][SUMS][s], double all[SUMS], double *usual_step)
 {
     count some = 0;
     for (int side = 0; side < SIDES; side++)
@@ -130,11 +151,11 @@ static bool set_sums(count s, const double level[s][s], const double window[s],
             struct pair of = pair_at(s, level, side, j);
             steps[some++] = of.paper - of.ink;
         }
-    double usual = middle(some, steps);
-    if (!(usual > minimum_step))
-        return false;
+    double usual = *usual_step = middle(some, steps);
     for (int sum = 0; sum < SUMS; sum++)
         all[sum] = 0;
+    if (!(usual > minimum_step))
+        return false;
     for (int side = 0; side < SIDES; side++) {
         double clear = 0;
         for (int sum = 0; sum < SUMS; sum++)
@@ -176,7 +197,7 @@ void cell_evidence(count h, count w, count k, count s, count n, const uint8_t gr
         if (border < 1)
             continue;
         double of_part = weights[0], of_border = weights[1], of_corner = weights[2];
-        double shares[2], shown[2], all[SUMS];
+        double shares[2], shown[2], all[SUMS], usual;
         for (int axis = 0; axis < 2; axis++) {
             shares[axis] = lesser(normal_share(-sizes[i][axis] / blurs[i] / 2), most_mixed);
             shown[axis] = normal_share(corner * sizes[i][axis] / blurs[i]);
@@ -184,7 +205,8 @@ void cell_evidence(count h, count w, count k, count s, count n, const uint8_t gr
         set_levels(h, w, s, gray, frames[i], places, shares, spread[i], offset, levels,
                    sums[SIDES][0]);
         seen[i] = set_sums(s, levels[0], window, minimum_step, of_usual, share, sums[SIDES][0], sums,
-                           all);
+                           all, &usual);
+        struct step least = least_step(s, levels[0], usual, minimum_step);
         for (count row = 1; row <= last && seen[i]; row++)
             for (count column = 1; column <= last; column++) {
                 double mean[SUMS];
@@ -194,6 +216,8 @@ void cell_evidence(count h, count w, count k, count s, count n, const uint8_t gr
                                 window[last - row] * sums[2][sum][column] +
                                 window[column - 1] * sums[3][sum][row] + everywhere * all[sum];
                 double half = mean[MIDDLES] / mean[TOTAL], step = mean[STEPS] / mean[TOTAL];
+                if (least.whole > 0)
+                    half = least.half, step = least.whole;
                 double of_parts[PARTS], parts = 0, product = 1;
                 for (int part = 0; part < PARTS; part++) {
                     double of = sharpness * (levels[part][row][column] - half) / step;

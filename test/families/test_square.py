@@ -305,6 +305,16 @@ def test_the_filter_finds_markers_that_stripes_hide(detect: Detector) -> None:
     assert wrong == false == 0
 
 
+@pytest.mark.parametrize('light', ['stripe', 'lattice'])
+def test_light_may_change_within_markers_by_less_than_ink(light: str, detect: Detector) -> None:
+    """Paper in shadow is darker than paper in light by far, but brighter than any ink."""
+    size = {'width': 1600, 'height': 1200, 'targets': 20, 'dot_radius': 24.0}
+    shown = scene(**size, distractors=8, light=light, ambient=0.12, seed=1003)
+    right, wrong, false = counted(shown, detect(shown.image))
+    assert right >= 17
+    assert wrong == false == 0
+
+
 @pytest.mark.parametrize('light', ['stripe', 'lattice', 'fringe'])
 def test_places_are_those_of_the_image_as_received(light: str, detect: Detector) -> None:
     shown = scene(light=light, ambient=0.3)

@@ -7,7 +7,7 @@ import pytest
 
 from ahf_ros import kernels
 
-SEEDS = range(6)
+SEEDS, SHADED = range(6), 4
 INSIDE, BORDER = 4, 1
 SIDE = INSIDE + 2 * BORDER
 PLACES = np.array([[0.0, 0.0], [-0.2, -0.2], [-0.2, 0.2], [0.2, -0.2], [0.2, 0.2]])
@@ -60,6 +60,9 @@ def plainly(
         rows, columns = np.abs(ink - np.array([row + 1, column + 1])[:, None]).swapaxes(0, 1)
         weights = clear * (WINDOW[rows] * WINDOW[columns] + EVERYWHERE)
         half, step = (np.average(of, weights=weights) for of in ((dark + bright) / 2, steps))
+        low, high = dark[:, 1:-1].max(), bright[:, 1:-1].min()
+        if low - dark[:, 1:-1].min() > usual / 2 and high - low > LEAST / 2:
+            half, step = (high + low) / 2, high - low
         of_parts = np.clip(SHARPNESS * (levels[:, row + 1, column + 1] - half) / step, -MOST, MOST)
         terms = math.log(2) - np.log1p(np.exp(of_parts))
         against = terms[0] + WEIGHTS[0] * terms[1:].sum()
@@ -81,11 +84,16 @@ def plainly(
 
 
 def drawn(seed: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return an image of a marker or of noise, and the frames of some quadrilaterals near it."""
+    """Return an image of a marker or of noise, and the frames of some quadrilaterals near it.
+
+    A shadow lies on the markers of seeds from 4 on.
+    """
     generator = np.random.default_rng(seed)
     cells = np.pad(generator.random((INSIDE, INSIDE)) < 0.5, BORDER)
     cells = np.pad(cells, 2, constant_values=True)
-    gray = np.kron(np.where(cells, 190, 30), np.ones((9, 9))) + generator.normal(0, 8, (90, 90))
+    gray = np.kron(np.where(cells, 190.0, 30.0), np.ones((9, 9)))
+    gray *= np.where(np.arange(90) < 50, 1.0, 1.0 if seed < SHADED else 0.25)
+    gray += generator.normal(0, 8 if seed < SHADED else 2, (90, 90))
     if not seed:
         gray = generator.uniform(0, 255, (90, 90))
     frames = np.array([[[54.0, 0, 44.5], [0, 54, 44.5], [0, 0, 1]]]).repeat(5, axis=0)
@@ -112,7 +120,9 @@ def test_cells_say_what_plain_loops_find(seed: int) -> None:
         expected = plainly(gray, frames[index], sizes[index], blurs[index], index == 2)
         assert seen[index] == (expected is not None)
         if expected is not None:
-            np.testing.assert_allclose(paper[index], expected[0], atol=1e-5)
+            np.testing.assert_allclose(
+                paper[index], expected[0], atol=1e-5 if seed < SHADED else 1e-4
+            )
             np.testing.assert_allclose(odds[:, index], expected[1:], atol=1e-4)
     assert seen[0] == (seed > 0)
 

@@ -218,8 +218,8 @@ def _evidence(
 ) -> _Evidence:
     """Return what the cells of quadrilaterals within a border say.
 
-    All are there twice, once by the darkest part of each cell, as where light has spread from paper
-    over ink; those with small cells once more, as in a sharp image.
+    All are there twice, once by the darkest part of each cell, as where light has spread from
+    paper over ink; those with small cells once more, as in a sharp image.
     """
     side = cells + 2 * border
     small = np.flatnonzero(sizes < _SMALL_CELL * side)
