@@ -317,7 +317,7 @@ void cell_evidence(count h, count w, count k, count s, count n, const uint8_t gr
                    const bool spread[k], const double window[s], const double places[5][2],
                    double offset, double most_mixed, double minimum_step, double of_usual,
                    double share, double everywhere, double sharpness, double most, double unclear,
-                   const double weights[3], double corner, bool seen[k],
+                   double unusual, const double weights[3], double corner, bool seen[k],
                    float paper[k][n][n], double odds[3][k], double levels[5][s][s],
                    double sums[6][3][s]);
 

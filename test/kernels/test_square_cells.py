@@ -12,7 +12,8 @@ INSIDE, BORDER = 4, 1
 SIDE = INSIDE + 2 * BORDER
 PLACES = np.array([[0.0, 0.0], [-0.2, -0.2], [-0.2, 0.2], [0.2, -0.2], [0.2, 0.2]])
 OFFSET, MIXED, LEAST, USUAL, SHARE, EVERYWHERE = 4.0, 0.2, 0.35, 0.4, 0.6, 1e-6
-SHARPNESS, MOST, UNCLEAR, WEIGHTS, CORNER = 12.0, 3.0, 1.5, np.array([0.15, 0.3, 0.7]), 0.3
+SHARPNESS, MOST, UNCLEAR, UNUSUAL = 12.0, 3.0, 1.5, 2.5
+WEIGHTS, CORNER = np.array([0.15, 0.3, 0.7]), 0.3
 WINDOW = np.exp(-((np.arange(SIDE + 2) / 2.0) ** 2) / 2)
 
 
@@ -61,7 +62,8 @@ def plainly(
         weights = clear * (WINDOW[rows] * WINDOW[columns] + EVERYWHERE)
         half, step = (np.average(of, weights=weights) for of in ((dark + bright) / 2, steps))
         low, high = dark[:, 1:-1].max(), bright[:, 1:-1].min()
-        if low - dark[:, 1:-1].min() > usual / 2 and high - low > LEAST / 2:
+        uneven = low - dark[:, 1:-1].min() > usual / 2 and high - low > LEAST / 2
+        if uneven:
             half, step = (high + low) / 2, high - low
         of_parts = np.clip(SHARPNESS * (levels[:, row + 1, column + 1] - half) / step, -MOST, MOST)
         terms = math.log(2) - np.log1p(np.exp(of_parts))
@@ -80,7 +82,8 @@ def plainly(
             level = (math.exp(outermost) - low) / (high - low)
             of = SHARPNESS * (1 - blurred) * ((1 + blurred) / 2 - level)
             square += min(max(of, -MOST), MOST)
-    return evidence, odds[0], square, odds[1]
+    against = UNUSUAL * (int(spread) + int(uneven))
+    return evidence, odds[0] - against, square - against, odds[1]
 
 
 def drawn(seed: int) -> tuple[np.ndarray, np.ndarray]:
@@ -105,7 +108,7 @@ def drawn(seed: int) -> tuple[np.ndarray, np.ndarray]:
 def evidence(gray: np.ndarray, frames: np.ndarray, sizes: np.ndarray, blurs: np.ndarray) -> tuple:
     spread = np.arange(len(frames)) == 2
     of_levels = OFFSET, MIXED, LEAST, USUAL, SHARE, EVERYWHERE
-    of_cells = SHARPNESS, MOST, UNCLEAR, WEIGHTS, CORNER
+    of_cells = SHARPNESS, MOST, UNCLEAR, UNUSUAL, WEIGHTS, CORNER
     seen = gray, frames, sizes, blurs, spread, WINDOW, PLACES
     return kernels.cell_evidence(*seen, *of_levels, *of_cells, n=INSIDE)[:3]
 
@@ -177,7 +180,17 @@ def test_bad_values_end(bad: float) -> None:
     evidence(gray, frames, np.full((3, 2), bad), np.full(3, bad))
     kernels.dark_inside(gray, frames, [bad], bad, bad, 0.0, bad, bad)
     kernels.cell_evidence(
-        gray, frames[:1], [[1.0, 1.0]], [1.0], [True], [1.0], PLACES, *[bad] * 9, WEIGHTS, bad, n=3
+        gray,
+        frames[:1],
+        [[1.0, 1.0]],
+        [1.0],
+        [True],
+        [1.0],
+        PLACES,
+        *[bad] * 10,
+        WEIGHTS,
+        bad,
+        n=3,
     )
     of_words = np.full((1, 2, 4), 255, np.uint8), *np.full((3, 2), bad)
     kernels.likeliest_words([[np.float32(1)]], [bad], [bad], [True], *of_words, bad, bad, bad)

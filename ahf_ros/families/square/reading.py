@@ -37,7 +37,7 @@ _CORNER = 0.3  # from a corner of the border, in cells
 _BLURS = 0.7, 0.4  # of a usual image and of a sharp one, standard deviations in px
 _SMALL_CELL = 2.0  # below which they differ, px
 _SMALLEST_CELL = 1.0  # that can be read, px
-_SPREADS = 3.0  # logarithmic odds against an image in which it does
+_UNUSUAL = 3.0  # log odds against light that spreads over ink, or changes within a marker
 _MOST_MIXED = 0.2  # share that a cell takes from each neighbour, at most
 _REACH = 0.25  # standard deviation of the window that levels are taken from, in sides
 _EVERYWHERE = 1e-6  # weight of all others, if there is none in this window
@@ -244,17 +244,17 @@ def _evidence(
         _SHARPNESS,
         _COVERED,
         _UNCLEAR,
+        _UNUSUAL,
         weights,
         _CORNER,
         n=cells,
     )
     which = np.flatnonzero(seen)
-    rare = _SPREADS * spread[which]
     whole = (around > _WHOLE) & (square > 0)
     return _Evidence(
         tried[which],
         paper[which].reshape(-1, cells**2),
-        ink[which] - rare,
-        square[which] - rare,
+        ink[which],
+        square[which],
         whole[which],
     )
