@@ -311,7 +311,8 @@ void dark_inside(count h, count w, count k, count n, const uint8_t gray[h][w],
 /* By how much the log odds of markers of n by n cells grow where a cell is paper, and those where
    all are ink; those of square corners; which borders are seen at all, and which are whole. A grid
    has s by s cells, of some size, px, with the border and one more cell of paper around it. Where
-   light is spread, only the darkest part of a cell tells what it is. */
+   light is spread, only the darkest part of a cell tells what it is. Where it changes along the
+   border, cells are compared with its brightest ink and the darkest paper. Either has a price. */
 void cell_evidence(count h, count w, count k, count s, count n, const uint8_t gray[h][w],
                    const double frames[k][3][3], const double sizes[k][2], const double blurs[k],
                    const bool spread[k], const double window[s], const double places[5][2],

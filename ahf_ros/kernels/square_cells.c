@@ -152,10 +152,10 @@ static bool set_sums(count s, const double level[s][s], const double window[s],
             steps[some++] = of.paper - of.ink;
         }
     double usual = *usual_step = middle(some, steps);
-    for (int sum = 0; sum < SUMS; sum++)
-        all[sum] = 0;
     if (!(usual > minimum_step))
         return false;
+    for (int sum = 0; sum < SUMS; sum++)
+        all[sum] = 0;
     for (int side = 0; side < SIDES; side++) {
         double clear = 0;
         for (int sum = 0; sum < SUMS; sum++)
@@ -206,8 +206,10 @@ void cell_evidence(count h, count w, count k, count s, count n, const uint8_t gr
                    sums[SIDES][0]);
         seen[i] = set_sums(s, levels[0], window, minimum_step, of_usual, share, sums[SIDES][0], sums,
                            all, &usual);
+        if (!seen[i])
+            continue;
         struct step least = least_step(s, levels[0], usual, minimum_step);
-        for (count row = 1; row <= last && seen[i]; row++)
+        for (count row = 1; row <= last; row++)
             for (count column = 1; column <= last; column++) {
                 double mean[SUMS];
                 for (int sum = 0; sum < SUMS; sum++)

@@ -45,17 +45,17 @@ def features(read: Hypotheses) -> np.ndarray:
     against them: spots of a lattice about a spot show a word, but reach beyond its band.
     """
     uneven = np.isnan(read.unlike)
-    seen = np.maximum(read.seen, 0) / np.maximum(read.typical, _LITTLE)
+    typical = np.maximum(read.typical, _LITTLE)
     return np.stack(
         [
             np.log1p(np.maximum(read.margin, 0)),
             1 - np.sqrt(1 + np.maximum(-read.coded, 0)),
             read.share - 1,
-            np.clip(seen, 0, 1) - 1,
+            np.clip(read.seen / typical, 0, 1) - 1,
             -np.exp(-np.maximum(read.marked, 0) / _of_bare_paper(read)),
             -np.exp(1 - _spots(read)) * uneven,
             np.where(uneven, 0, np.minimum(COVERED - read.unlike, 0)),
-            np.clip(read.outer / np.maximum(read.typical, _LITTLE), -1, 0),
+            np.clip(read.outer / typical, -1, 0),
         ],
         axis=1,
     )

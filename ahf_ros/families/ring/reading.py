@@ -194,8 +194,13 @@ def _settled(
     hidden = of_all.hidden | (polar.reach < of_band[0])
     # What speaks against no target is that of edges, so that all targets compare.
     of_edges = words.select(some)
-    seen = {name: getattr(of_edges, name) for name in ('seen', 'typical', 'outer')}
-    of_all = replace(of_all, hidden=hidden, **seen)
+    of_all = replace(
+        of_all,
+        hidden=hidden,
+        seen=of_edges.seen,
+        typical=of_edges.typical,
+        outer=of_edges.outer,
+    )
     return words.replaced(some, of_all)
 
 
