@@ -310,16 +310,16 @@ void dark_inside(count h, count w, count k, count n, const uint8_t gray[h][w],
                  double inside, double offset, double times, double share, bool dark[k]);
 /* By how much the log odds of markers of n by n cells grow where a cell is paper, and those where
    all are ink; those of square corners; which borders are seen at all, and which are whole. A grid
-   has s by s cells, of some size, px, with the border and one more cell of paper around it. Where
-   light is spread, only the darkest part of a cell tells what it is. Where it changes along the
-   border, cells are compared with its brightest ink and the darkest paper. Either has a price. */
+   has s by s cells, of some size, px, with the border and one more cell of paper around it. Each is
+   read by the mean of the parts of its cells, and where light may be spread, by the darkest part of
+   each, too. Where light changes along the border, cells are compared with its brightest ink and the darkest paper. Either has a price. */
 void cell_evidence(count h, count w, count k, count s, count n, const uint8_t gray[h][w],
                    const double frames[k][3][3], const double sizes[k][2], const double blurs[k],
                    const bool spread[k], const double window[s], const double places[5][2],
                    double offset, double most_mixed, double minimum_step, double of_usual,
                    double share, double everywhere, double sharpness, double most, double unclear,
-                   double unusual, const double weights[3], double corner, bool seen[k],
-                   float paper[k][n][n], double odds[3][k], double levels[5][s][s],
+                   double unusual, const double weights[3], double corner, bool seen[2][k],
+                   float paper[2][k][n][n], double odds[3][2][k], double levels[6][s][s],
                    double sums[6][3][s]);
 
 /* square_words.c */

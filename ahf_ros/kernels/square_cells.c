@@ -8,6 +8,8 @@
 #include "robust.h"
 
 enum { SIDES = 4, PARTS = 5 };
+/* Planes of cells as a whole, by the mean and by the darkest of their parts; parts are between. */
+enum { MEAN, DARKEST = PARTS, PLANES };
 /* Sums along sides of a border, over which levels of ink and paper are known. */
 enum { TOTAL, MIDDLES, STEPS, SUMS };
 /* Logarithmic odds of a marker whose cells are ink, of square corners, and of the border. */
@@ -68,36 +70,39 @@ static void transpose(count n, double values[n][n])
         }
 }
 
-/* Logarithms of cells as a whole, their darkest parts where light is spread, and of their parts. */
-static void set_levels(count h, count w, count s, const uint8_t gray[h][w],
-                       const double frame[3][3], const double places[PARTS][2],
-                       const double shares[2], bool spread, double offset,
-                       double levels[PARTS][s][s], double scale[s])
+/* Cells as a whole, without what blur mixes into each: by the mean of their parts in the first
+   plane, and by the darkest of these and of their middle in the last one; parts between. */
+static void set_cells(count h, count w, count s, const uint8_t gray[h][w],
+                      const double frame[3][3], const double places[PARTS][2],
+                      const double shares[2], double levels[PLANES][s][s], double scale[s])
 {
     double side = (double)(s - 2), middle = (double)(s - 1) / 2;
-    for (int part = spread ? 0 : 1; part < PARTS; part++)
-        for (count row = 0; row < s; row++)
-            for (count column = 0; column < s; column++) {
-                double x = ((double)column - middle + places[part][0]) / side;
-                double y = ((double)row - middle + places[part][1]) / side;
-                levels[part][row][column] = sampled(h, w, gray, frame, x, y);
-            }
     for (count row = 0; row < s; row++)
         for (count column = 0; column < s; column++) {
-            double sum = 0, least = levels[0][row][column];
-            for (int part = 1; part < PARTS; part++) {
-                sum += levels[part][row][column];
-                least = lesser(least, levels[part][row][column]);
+            double sum = 0, least = INFINITY;
+            for (int part = 0; part < PARTS; part++) {
+                double x = ((double)column - middle + places[part][0]) / side;
+                double y = ((double)row - middle + places[part][1]) / side;
+                double level = sampled(h, w, gray, frame, x, y);
+                least = lesser(least, level);
+                sum += part ? level : 0;
+                levels[part][row][column] = level;
             }
-            levels[0][row][column] = spread ? least : sum / (PARTS - 1);
+            levels[MEAN][row][column] = sum / (PARTS - 1);
+            levels[DARKEST][row][column] = least;
         }
-    unmix(s, shares[1], levels[0], scale);
-    transpose(s, levels[0]);
-    unmix(s, shares[0], levels[0], scale);
-    transpose(s, levels[0]);
-    double *all = levels[0][0];
-    for (count cell = 0; cell < PARTS * s * s; cell++)
-        all[cell] = logarithm(greater(all[cell], 0) + offset);
+    for (int plane = MEAN; plane < PLANES; plane += DARKEST - MEAN) {
+        unmix(s, shares[1], levels[plane], scale);
+        transpose(s, levels[plane]);
+        unmix(s, shares[0], levels[plane], scale);
+        transpose(s, levels[plane]);
+    }
+}
+
+static void set_logarithms(count n, double values[n], double offset)
+{
+    for (count i = 0; i < n; i++)
+        values[i] = logarithm(greater(values[i], 0) + offset);
 }
 
 /* Cells of the border, and of paper beside it. */
@@ -181,77 +186,95 @@ static bool set_sums(count s, const double level[s][s], const double window[s],
     return true;
 }
 
+static inline double bounded(double odds, double most)
+{
+    return lesser(greater(odds, -most), most);
+}
+
+/* Logarithmic odds of a square corner: its outermost part is as bright as paper if it is round. */
+static double corner_odds(double outermost, double half, double step, const double shown[2],
+                          double sharpness)
+{
+    double dark = exponential(-step / 2), bright = exponential(step / 2);
+    double level = (exponential(outermost - half) - dark) / (bright - dark);
+    double blurred = 1 - shown[0] * shown[1];
+    return sharpness * (1 - blurred) * ((1 + blurred) / 2 - level);
+}
+
 void cell_evidence(count h, count w, count k, count s, count n, const uint8_t gray[h][w],
                    const double frames[k][3][3], const double sizes[k][2], const double blurs[k],
                    const bool spread[k], const double window[s], const double places[5][2],
                    double offset, double most_mixed, double minimum_step, double of_usual,
                    double share, double everywhere, double sharpness, double most, double unclear,
-                   double unusual, const double weights[3], double corner, bool seen[k],
-                   float paper[k][n][n], double odds[3][k], double levels[5][s][s],
+                   double unusual, const double weights[3], double corner, bool seen[2][k],
+                   float paper[2][k][n][n], double odds[3][2][k], double levels[6][s][s],
                    double sums[6][3][s])
 {
     count border = (s - 2 - n) / 2, last = s - 2;
+    double of_part = weights[0], of_border = weights[1], of_corner = weights[2];
     for (count i = 0; i < k; i++) {
-        seen[i] = false;
-        odds[INK][i] = odds[SQUARE][i] = odds[AROUND][i] = 0;
-        if (border < 1)
-            continue;
-        double of_part = weights[0], of_border = weights[1], of_corner = weights[2];
         double shares[2], shown[2], all[SUMS], usual;
+        bool logarithms = false;
         for (int axis = 0; axis < 2; axis++) {
             shares[axis] = lesser(normal_share(-sizes[i][axis] / blurs[i] / 2), most_mixed);
             shown[axis] = normal_share(corner * sizes[i][axis] / blurs[i]);
         }
-        set_levels(h, w, s, gray, frames[i], places, shares, spread[i], offset, levels,
-                   sums[SIDES][0]);
-        seen[i] = set_sums(s, levels[0], window, minimum_step, of_usual, share, sums[SIDES][0], sums,
-                           all, &usual);
-        if (!seen[i])
-            continue;
-        struct step least = least_step(s, levels[0], usual, minimum_step);
-        for (count row = 1; row <= last; row++)
-            for (count column = 1; column <= last; column++) {
-                double mean[SUMS];
-                for (int sum = 0; sum < SUMS; sum++)
-                    mean[sum] = window[row - 1] * sums[0][sum][column] +
-                                window[last - column] * sums[1][sum][row] +
-                                window[last - row] * sums[2][sum][column] +
-                                window[column - 1] * sums[3][sum][row] + everywhere * all[sum];
-                double half = mean[MIDDLES] / mean[TOTAL], step = mean[STEPS] / mean[TOTAL];
-                if (least.whole > 0)
-                    half = least.half, step = least.whole;
-                double of_parts[PARTS], parts = 0, product = 1;
-                for (int part = 0; part < PARTS; part++) {
-                    double of = sharpness * (levels[part][row][column] - half) / step;
-                    of_parts[part] = lesser(greater(of, -most), most);
-                    if (part) {
-                        parts += of_parts[part];
-                        product *= (1 + exponential(of_parts[part])) / 2;
+        set_cells(h, w, s, gray, frames[i], places, shares, levels, sums[SIDES][0]);
+        for (int reading = 0; reading < 2; reading++) {
+            double(*whole)[s] = levels[reading ? DARKEST : MEAN];
+            double ink = 0, square = 0, around = 0;
+            seen[reading][i] = false;
+            odds[INK][reading][i] = odds[SQUARE][reading][i] = odds[AROUND][reading][i] = 0;
+            if (border < 1 || (reading && !spread[i]))
+                continue;
+            set_logarithms(s * s, whole[0], offset);
+            if (!set_sums(s, whole, window, minimum_step, of_usual, share, sums[SIDES][0], sums,
+                          all, &usual))
+                continue;
+            seen[reading][i] = true;
+            if (!logarithms)
+                set_logarithms((PARTS - 1) * s * s, levels[1][0], offset);
+            logarithms = true;
+            struct step least = least_step(s, whole, usual, minimum_step);
+            for (count row = 1; row <= last; row++)
+                for (count column = 1; column <= last; column++) {
+                    double mean[SUMS];
+                    for (int sum = 0; sum < SUMS; sum++)
+                        mean[sum] = window[row - 1] * sums[0][sum][column] +
+                                    window[last - column] * sums[1][sum][row] +
+                                    window[last - row] * sums[2][sum][column] +
+                                    window[column - 1] * sums[3][sum][row] + everywhere * all[sum];
+                    double half = mean[MIDDLES] / mean[TOTAL], step = mean[STEPS] / mean[TOTAL];
+                    if (least.whole > 0)
+                        half = least.half, step = least.whole;
+                    double of_whole = bounded(sharpness * (whole[row][column] - half) / step, most);
+                    double parts = 0, product = 1;
+                    for (int part = 1; part < PARTS; part++) {
+                        double of = sharpness * (levels[part][row][column] - half) / step;
+                        parts += bounded(of, most);
+                        product *= (1 + exponential(bounded(of, most))) / 2;
+                    }
+                    double against = -logarithm((1 + exponential(of_whole)) / 2);
+                    against -= of_part * logarithm(product) + unclear * (1 - fabs(of_whole) / most);
+                    count r = row - 1 - border, c = column - 1 - border;
+                    if (r >= 0 && r < n && c >= 0 && c < n) {
+                        paper[reading][i][r][c] = (float)(of_whole + of_part * parts);
+                        ink += against;
+                        continue;
+                    }
+                    around += of_border * against;
+                    bool top = row == 1, left = column == 1;
+                    if ((top || row == last) && (left || column == last)) {
+                        around += of_corner * against;
+                        double outermost = levels[1 + !top + 2 * !left][row][column];
+                        double of = corner_odds(outermost, half, step, shown, sharpness);
+                        square += bounded(of, most);
                     }
                 }
-                double against = -logarithm((1 + exponential(of_parts[0])) / 2);
-                against -= of_part * logarithm(product) + unclear * (1 - fabs(of_parts[0]) / most);
-                count r = row - 1 - border, c = column - 1 - border;
-                if (r >= 0 && r < n && c >= 0 && c < n) {
-                    paper[i][r][c] = (float)(of_parts[0] + of_part * parts);
-                    odds[INK][i] += against;
-                    continue;
-                }
-                odds[AROUND][i] += of_border * against;
-                bool top = row == 1, left = column == 1;
-                if ((top || row == last) && (left || column == last)) {
-                    odds[AROUND][i] += of_corner * against;
-                    /* The outermost part is as bright as paper if the corner is round. */
-                    double dark = exponential(-step / 2), bright = exponential(step / 2);
-                    double outermost = levels[1 + !top + 2 * !left][row][column];
-                    double level = (exponential(outermost - half) - dark) / (bright - dark);
-                    double blurred = 1 - shown[0] * shown[1];
-                    double of = sharpness * (1 - blurred) * ((1 + blurred) / 2 - level);
-                    odds[SQUARE][i] += lesser(greater(of, -most), most);
-                }
-            }
-        double against = unusual * (spread[i] + (least.whole > 0));
-        odds[INK][i] += odds[AROUND][i] - against;
-        odds[SQUARE][i] -= against;
+            double against = unusual * (reading + (least.whole > 0));
+            odds[INK][reading][i] = ink + (around - against);
+            odds[SQUARE][reading][i] = square - against;
+            odds[AROUND][reading][i] = around;
+        }
     }
 }

@@ -5,6 +5,8 @@
 
 #include "kernels.h"
 
+enum { RUN = 16, AROUND = 10 }; /* cells that are looked at together, and to a side about one */
+
 /* Votes of edges for the cells at steps along their directions: p polarities, with steps of their
    own, by d directions of the major axes of ellipses. An edge of an ellipse votes along the line
    from its point there to the centre, if it is a flat one. Coordinates are in cells. */
@@ -39,44 +41,39 @@ void count_votes(count n, count p, count s, count d, count tall, count wide, con
         }
 }
 
-static inline float votes_in(count rows, count wide, const uint16_t votes[rows][wide], count row,
-                             count column)
+/* Votes of the cells of a square from one on; beyond all of them there are none. */
+static inline void read_square(count rows, count wide, const uint16_t votes[rows][wide], count side,
+                               count first_row, count first_column, float square[side][side])
 {
-    bool inside = row >= 0 && row < rows && column >= 0 && column < wide;
-    return inside ? votes[row][column] : 0;
+    bool whole = first_row >= 0 && first_row + side <= rows && first_column >= 0 &&
+                 first_column + side <= wide;
+    for (count r = 0; r < side; r++)
+        for (count c = 0; c < side; c++) {
+            count row = first_row + r, column = first_column + c;
+            bool inside = whole || (row >= 0 && row < rows && column >= 0 && column < wide);
+            square[r][c] = inside ? votes[row][column] : 0;
+        }
 }
 
-/* Votes in a cell and, with less weight, beside it. Of three by three blocks of two by two cells
-   from a first cell on, those count that are whole. */
-static inline float weighted(count rows, count wide, const uint16_t votes[rows][wide], count row,
-                             count column, count first_row, count first_column,
-                             const bool whole[3][3])
+/* Votes in a cell and, with less weight, beside it. */
+static inline float weighted(count side, const float votes[side][side], count row, count column)
 {
     static const float weights[3] = {0.5f, 1.0f, 0.5f};
     float sum = 0;
     for (int down = -1; down <= 1; down++)
-        for (int across = -1; across <= 1; across++) {
-            count r = row + down, c = column + across;
-            if (whole[(r - first_row) / 2][(c - first_column) / 2])
-                sum += weights[1 + down] * weights[1 + across] *
-                       votes_in(rows, wide, votes, r, c);
-        }
+        for (int across = -1; across <= 1; across++)
+            sum += weights[1 + down] * weights[1 + across] * votes[row + down][column + across];
     return sum;
 }
 
-/* Tell which of three by three blocks from a first cell on have enough votes with three others. */
-static inline void find_whole(count rows, count wide, const uint16_t votes[rows][wide],
-                              count first_row, count first_column, float enough,
-                              bool whole[3][3])
+/* Leave out the votes of blocks, three by three in the middle, that have few with three others. */
+static inline void leave_whole(float enough, float votes[AROUND][AROUND], bool whole[3][3])
 {
     float blocks[5][5];
     for (int r = 0; r < 5; r++)
-        for (int c = 0; c < 5; c++) {
-            blocks[r][c] = 0;
-            for (int cell = 0; cell < 4; cell++)
-                blocks[r][c] += votes_in(rows, wide, votes, first_row - 2 + 2 * r + cell / 2,
-                                         first_column - 2 + 2 * c + cell % 2);
-        }
+        for (int c = 0; c < 5; c++)
+            blocks[r][c] = votes[2 * r][2 * c] + votes[2 * r][2 * c + 1] +
+                           votes[2 * r + 1][2 * c] + votes[2 * r + 1][2 * c + 1];
     for (int r = 0; r < 3; r++)
         for (int c = 0; c < 3; c++) {
             whole[r][c] = false;
@@ -87,6 +84,9 @@ static inline void find_whole(count rows, count wide, const uint16_t votes[rows]
                                enough;
             }
         }
+    for (int r = 0; r < 6; r++)
+        for (int c = 0; c < 6; c++)
+            votes[2 + r][2 + c] *= whole[r / 2][c / 2];
 }
 
 /* Where the parabola through values at -1, 0 and 1 is highest, at most half a cell away. */
@@ -125,6 +125,21 @@ void highest_cells(count n, const int64_t cells[n], const float values[n], int64
         highest[i] = is_highest(n, cells, values, wide, reach, i);
 }
 
+/* The first cell of a row, from one on, with more votes than its own need be; `wide` without any. */
+static inline count next_above(count wide, const uint16_t votes[wide], count from, float own)
+{
+    for (; from + RUN <= wide; from += RUN) { /* most cells have none */
+        uint16_t most = 0;
+        for (count c = from; c < from + RUN; c++)
+            most = votes[c] > most ? votes[c] : most;
+        if (most > own)
+            break;
+    }
+    while (from < wide && !(votes[from] > own))
+        from++;
+    return from;
+}
+
 /* Cells with more votes in them and beside them than needed, and none with more within reach,
    their votes, and where between cells their tops are. Cells in blocks that, with some neighbours,
    have few do not count. Of no more cells than `most`, the first ones, only some are highest. */
@@ -132,21 +147,25 @@ void vote_peaks(count rows, count wide, count most, const uint16_t votes[rows][w
                 float needed, float enough, float flat, int64_t reach, int64_t cells[most],
                 float sums[most], float shift[2][most], bool highest[most])
 {
-    static const bool all[3][3] = {{1, 1, 1}, {1, 1, 1}, {1, 1, 1}};
+    float beside[3][3], around[AROUND][AROUND];
     bool whole[3][3];
     count n = 0;
     for (count r = 0; r < rows; r++)
-        for (count c = 0; c < wide; c++) {
-            /* Of the first of three by three blocks, the middle one of which has the cell. */
-            count first_row = (r & ~(count)1) - 2, first_column = (c & ~(count)1) - 2;
-            if (n == most || !(votes[r][c] > own) ||
-                !(weighted(rows, wide, votes, r, c, first_row, first_column, all) > needed))
+        for (count c = next_above(wide, votes[r], 0, own); c < wide;
+             c = next_above(wide, votes[r], c + 1, own)) {
+            if (n == most)
+                break;
+            read_square(rows, wide, votes, 3, r - 1, c - 1, beside);
+            if (!(weighted(3, beside, 1, 1) > needed))
                 continue;
-            find_whole(rows, wide, votes, first_row, first_column, enough, whole);
+            /* Of two blocks to each side of its own, and where it is there. */
+            count down = 4 + r % 2, right = 4 + c % 2;
+            read_square(rows, wide, votes, AROUND, r - down, c - right, around);
+            leave_whole(enough, around, whole);
             float near[5];
             for (int i = 0; i < 5; i++)
-                near[i] = weighted(rows, wide, votes, r + (i == 4) - (i == 3),
-                                   c + (i == 2) - (i == 1), first_row, first_column, whole);
+                near[i] = weighted(AROUND, around, down + (i == 4) - (i == 3),
+                                   right + (i == 2) - (i == 1));
             if (!whole[1][1] || !(near[0] > needed))
                 continue;
             cells[n] = r * wide + c;

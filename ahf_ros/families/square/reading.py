@@ -224,10 +224,9 @@ def _evidence(
     side = cells + 2 * border
     small = np.flatnonzero(sizes < _SMALL_CELL * side)
     every = np.arange(len(frames))
-    tried = np.concatenate([every, small, every])
-    counts = len(every), len(small), len(every)
-    blurs = np.repeat([*_BLURS, _BLURS[0]], counts)
-    spread = np.repeat([False, False, True], counts)
+    tried = np.concatenate([every, small])
+    counts = len(every), len(small)
+    blurs, spread = np.repeat(_BLURS, counts), np.repeat([True, False], counts)
     lengths = side_lengths(corners[tried]) / side
     reach = (np.arange(side + 2) / (_REACH * (side + 2))) ** 2
     of_levels = LOG_OFFSET, _MOST_MIXED, _MINIMUM_STEP, _OF_USUAL, _SIDE, _EVERYWHERE
@@ -250,11 +249,11 @@ def _evidence(
         n=cells,
     )
     which = np.flatnonzero(seen)
-    whole = (around > _WHOLE) & (square > 0)
+    ink, square, around = (of.ravel()[which] for of in (ink, square, around))
     return _Evidence(
-        tried[which],
-        paper[which].reshape(-1, cells**2),
-        ink[which],
-        square[which],
-        whole[which],
+        tried[which % len(tried)],
+        paper.reshape(-1, cells**2)[which],
+        ink,
+        square,
+        (around > _WHOLE) & (square > 0),
     )
