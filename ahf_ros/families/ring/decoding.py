@@ -125,15 +125,14 @@ def decode(
     family: RingPrint,
     expected: frozenset[int] = frozenset(),
     *,
-    arcs: bool = True,
-    looks: bool = True,
+    draft: bool = False,
 ) -> Words:
     """Return the words with the most evidence, of k bands at m angles in the order of sectors.
 
     `overhang`, shape (k,), is by how many angles ink is longer at either end than its sectors;
-    `expected` are IDs that are likely to be there. Empty: all IDs are equally likely. Without
-    `arcs` nothing else explains the marks, so that `coded` is 0, and without `looks` words stand
-    for the sectors as they look as well.
+    `expected` are IDs that are likely to be there. Empty: all IDs are equally likely. In a `draft`
+    nothing else explains the marks, so that `coded` is 0, and words stand for the sectors as they
+    look as well.
     """
     of_bands = without_outliers(evidence)
     count, angles = of_bands.paper.shape
@@ -162,18 +161,14 @@ def decode(
     score = scores[rows, best].astype(np.float64)
     hidden = bands.hidden(shown) | ((bands.some.paper == 0) & (bands.some.ink == 0))
     inked, mixed = 2 * shown > bands.last, (shown > 0) & (shown < bands.last)
-    other, of_other = word, score
-    if looks:
+    other, of_other, coded, beside = word, score, *np.zeros((2, len(read)))
+    if not draft:
         other = _as_it_looks(ones, pairs, phase, family)
-    if (other != word).any():
         of_other = bands.scores(bands.steps(other[:, None], phase[:, None]))[:, 0]
-    coded = beside = np.zeros(len(read))
-    if arcs:
         border = _border(bands.some)
         of_arcs, borders = bands.arcs(border)
         price = _of_borders(inked, mixed, hidden, borders, border, family)
-        # A first look, which tells whether there is a doubt, knows no lens.
-        stiff, moved = bands.under_long_covers(shown, moved=looks)
+        stiff, moved = bands.under_long_covers(shown)
         coded, beside = stiff - of_arcs - price, np.maximum(moved - stiff, 0)
     found = Words(
         words=word,
@@ -256,14 +251,12 @@ class _Bands:
         scores, borders = kernels.free_arcs(some.looks, self.first, border, COVER, self.cost)
         return scores.astype(np.float64), borders
 
-    def under_long_covers(
-        self, steps: np.ndarray, *, moved: bool
-    ) -> tuple[np.ndarray, np.ndarray]:
+    def under_long_covers(self, steps: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the evidence for one word of each band where covers may be as long as arcs, (k,).
 
-        The second is that of bands which may be `moved` beside their dots.
+        The second is that of bands which may be moved beside their dots.
         """
-        ways = [steps, self._moved(steps)] if moved else [steps]
+        ways = [steps, self._moved(steps)]
         paths = self.scores(np.stack(ways, axis=1), long=True).astype(np.float64)
         return paths[:, 0], paths[:, -1]
 

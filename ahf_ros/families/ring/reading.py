@@ -1,9 +1,9 @@
 """Reading of the bands about dots, in a line of stages.
 
 Polar images of the dots; the growth of ink; the evidence of edges, which is a bound for what can
-be a target; the evidence of levels in the light that a target's ground predicts; the words; the
-joint fit of dot and band. A right word improves the frame and a better frame the evidence, so that
-evidence, words and fit come twice.
+be a target; the words; the joint fit of dot and band. A right word improves the frame and a better
+frame the evidence, so that evidence, words and fit come twice. The second time, the evidence of
+levels in the light that a target's ground predicts counts as well.
 """
 
 from __future__ import annotations
@@ -84,22 +84,15 @@ def _read_part(
     polar = on_dark_ground(polar, family.band)
     growth = best_growth(polar, family.band, prior)
     edges = edge_evidence(polar, 1 - growth, growth, family.band, SHARES)
-    words = decode(edges, _overhang(growth, family), family, prior.expected, looks=False)
+    words = decode(edges, _overhang(growth, family), family, prior.expected, draft=True)
     read = np.flatnonzero(_mean_odds(words, edges.weight) > hopeful)
     if not read.size:
         return unread
-    edges, growth = edges.select(read), growth[read]
+    words, growth = words.select(read), growth[read]
     printed = dots.select(read)
     printed = replace(printed, frames=frame.scaled(printed.frames, 1 - growth))
     # In the frame of the printed dot, the same growth is a larger share.
-    some = polar.select(read), edges, words.select(read)
     growth = growth / (1 - growth)
-    words = _settled(gray, printed, *some, growth, family, prior.expected, last=False)
-    good = _mean_odds(words, edges.weight) > hopeful
-    if not good.any():
-        return unread
-    read, growth = read[good], growth[good]
-    printed, words = printed.select(good), words.select(good)
     fit = _joint_fit(gray, printed, words, PER_SECTOR // 2, 1, family)
     fit = _by_dot(fit, printed, growth, _thin(printed, growth, family))
     # A dot and its band are not printed and grown alike: each is read where it was seen.
@@ -120,7 +113,7 @@ def _read_part(
         fit, bands = fit.select(asked), bands.select(asked)
         polar, edges, words = polar.select(asked), edges.select(asked), words.select(asked)
     overhang = _overhang(growth, family)
-    words = _settled(gray, bands, polar, edges, words, growth, family, prior.expected, last=True)
+    words = _settled(gray, bands, polar, edges, words, growth, family, prior.expected)
     words = with_ends(polar, words, overhang, family)
     words = replace(words, unlike=unlike_print(polar, words, growth, overhang, family))
     good = _mean_odds(words, edges.weight) > hopeful
@@ -165,13 +158,10 @@ def _settled(
     growth: np.ndarray,
     family: RingPrint,
     expected: frozenset[int],
-    *,
-    last: bool,
 ) -> Words:
     """Return the words of targets, by all evidence where edges alone leave a doubt.
 
     Targets are in the frames of their printed dots, the unit of the growth of their colour, (k,).
-    What else there is than words is looked at in the `last` reading only.
     """
     some = np.flatnonzero(_doubtful(words, edges))
     if not some.size:
@@ -190,7 +180,7 @@ def _settled(
     of_levels = level_evidence(polar, levels, light, spread, radii, growth, family.band, SHARES)
     evidence = edges.plus(of_levels)
     overhang = _overhang(growth, family)
-    of_all = decode(evidence, overhang, family, expected, arcs=last, looks=last)
+    of_all = decode(evidence, overhang, family, expected)
     hidden = of_all.hidden | (polar.reach < of_band[0])
     # What speaks against no target is that of edges, so that all targets compare.
     of_edges = words.select(some)
