@@ -1,9 +1,9 @@
 """Reading of the bands about dots, in a line of stages.
 
 Polar images of the dots; the growth of ink; the evidence of edges, which is a bound for what can
-be a target; the words; the joint fit of dot and band. A right word improves the frame and a better
-frame the evidence, so that evidence, words and fit come twice. The second time, the evidence of
-levels in the light that a target's ground predicts counts as well.
+be a target; the evidence of levels in the light that a target's ground predicts; the words; the
+joint fit of dot and band. A right word improves the frame and a better frame the evidence, so that
+evidence, words and fit come twice. What else a band may be is asked the second time only.
 """
 
 from __future__ import annotations
@@ -88,11 +88,18 @@ def _read_part(
     read = np.flatnonzero(_mean_odds(words, edges.weight) > hopeful)
     if not read.size:
         return unread
-    words, growth = words.select(read), growth[read]
+    edges, growth = edges.select(read), growth[read]
     printed = dots.select(read)
     printed = replace(printed, frames=frame.scaled(printed.frames, 1 - growth))
     # In the frame of the printed dot, the same growth is a larger share.
+    some = polar.select(read), edges, words.select(read)
     growth = growth / (1 - growth)
+    words = _settled(gray, printed, *some, growth, family, prior.expected, draft=True)
+    good = _mean_odds(words, edges.weight) > hopeful
+    if not good.any():
+        return unread
+    read, growth = read[good], growth[good]
+    printed, words = printed.select(good), words.select(good)
     fit = _joint_fit(gray, printed, words, PER_SECTOR // 2, 1, family)
     fit = _by_dot(fit, printed, growth, _thin(printed, growth, family))
     # A dot and its band are not printed and grown alike: each is read where it was seen.
@@ -113,7 +120,7 @@ def _read_part(
         fit, bands = fit.select(asked), bands.select(asked)
         polar, edges, words = polar.select(asked), edges.select(asked), words.select(asked)
     overhang = _overhang(growth, family)
-    words = _settled(gray, bands, polar, edges, words, growth, family, prior.expected)
+    words = _settled(gray, bands, polar, edges, words, growth, family, prior.expected, draft=False)
     words = with_ends(polar, words, overhang, family)
     words = replace(words, unlike=unlike_print(polar, words, growth, overhang, family))
     good = _mean_odds(words, edges.weight) > hopeful
@@ -143,12 +150,6 @@ def best_growth(
     return tried[np.arange(len(best)), best]
 
 
-def _doubtful(words: Words, edges: Evidence) -> np.ndarray:
-    """Return whether edges alone leave a doubt of their words, shape (k,)."""
-    doubtful: np.ndarray = (words.margin < CLEAR) | (words.coded < -DOUBT)
-    return doubtful | words.hidden.any(axis=1) | edges.covered.any(axis=(1, 2))
-
-
 def _settled(
     gray: np.ndarray,
     targets: Fit,
@@ -158,12 +159,19 @@ def _settled(
     growth: np.ndarray,
     family: RingPrint,
     expected: frozenset[int],
+    *,
+    draft: bool,
 ) -> Words:
     """Return the words of targets, by all evidence where edges alone leave a doubt.
 
     Targets are in the frames of their printed dots, the unit of the growth of their colour, (k,).
+    In a draft, only other words are a reason to doubt.
     """
-    some = np.flatnonzero(_doubtful(words, edges))
+    doubtful = words.margin < CLEAR
+    if not draft:
+        doubtful |= (words.coded < -DOUBT) | words.hidden.any(axis=1)
+        doubtful |= edges.covered.any(axis=(1, 2))
+    some = np.flatnonzero(doubtful)
     if not some.size:
         return words
     targets, polar, edges = targets.select(some), polar.select(some), edges.select(some)
@@ -180,7 +188,7 @@ def _settled(
     of_levels = level_evidence(polar, levels, light, spread, radii, growth, family.band, SHARES)
     evidence = edges.plus(of_levels)
     overhang = _overhang(growth, family)
-    of_all = decode(evidence, overhang, family, expected)
+    of_all = decode(evidence, overhang, family, expected, draft=draft)
     hidden = of_all.hidden | (polar.reach < of_band[0])
     # What speaks against no target is that of edges, so that all targets compare.
     of_edges = words.select(some)
