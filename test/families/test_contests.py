@@ -142,5 +142,5 @@ def test_readings_are_taken_over_where_they_belong() -> None:
 def test_centres_on_the_dots_of_others() -> None:
     found = hypotheses([50, 150], [2, 1])
     near = hypotheses([58, 162], [2, 1])
-    assert near.on_dots(found).tolist() == [True, False]
-    assert found.on_dots(found.select(np.zeros(2, bool))).tolist() == [False, False]
+    assert near.on_dots(found.frames).tolist() == [True, False]
+    assert found.on_dots(found.frames[:0]).tolist() == [False, False]

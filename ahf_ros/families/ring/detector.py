@@ -29,18 +29,18 @@ from ahf_ros.families.ring.parts import ImagePart, dots_in, image_parts
 from ahf_ros.families.ring.proposals import (
     PROPOSALS,
     Proposal,
+    dots_of,
     measure_alike,
     measure_dots,
     measure_likely,
     propose_whole,
-    proposing,
     with_rims,
 )
 from ahf_ros.families.ring.refinement import refine_centres
 from ahf_ros.families.undecoded import undecoded
 from ahf_ros.prints.ring import RingPrint
 from ahf_ros.vision import frame
-from ahf_ros.vision.circle_fit import NO_FITS, Fit
+from ahf_ros.vision.circle_fit import ENOUGH, NO_FITS, Fit
 from ahf_ros.vision.dots import Dots
 from ahf_ros.vision.ellipse_targets import frames_of, targets_from_frames
 from ahf_ros.vision.faint import faint_parts
@@ -80,21 +80,26 @@ class RingDetector(PyramidDetector):
         check_image(image)
         pyramid = bare_pyramid(as_gray(image), self.settings.max_radius)
         signs = np.array([it.polarity for it in targets], int)
-        known = proposing(Dots(frames_of(targets), signs, np.ones(len(signs))))
+        dots = Dots(frames_of(targets), signs, np.ones(len(signs)))
         names = {it.family for it in targets}
         shown = [code for code in self.design if code.name in names]
         of_image = pyramid, self.settings, self.expected
-        read = read_pyramid(*of_image, (known,), shown)
+        read = read_known(*of_image, dots, shown)
+        found, known = report(read, self.settings, self.contested), {it.print for it in targets}
+        others = [it for it in found if it.print not in known]
+        if others:  # one reading of a dot is not enough for what was not seen there before
+            read = read.select(~read.on_dots(frames_of(others)))
+            found = [it for it in found if it.print in known]
 
         @one_blas_thread()
         def search(parts: Sequence[Part]) -> list[Target]:
             views = image_parts(pyramid.image, parts, self.settings.max_radius)
-            found = read_pyramid(*of_image, PROPOSALS, shown, views, read)
+            of_parts = read_pyramid(*of_image, PROPOSALS, shown, views, read)
             for it in views:
-                found = _with_faint_parts(it, found, self.settings, self.expected)
-            return report(found, self.settings, self.contested)
+                of_parts = _with_faint_parts(it, of_parts, self.settings, self.expected)
+            return report(of_parts, self.settings, self.contested)
 
-        return Confirmed(report(read, self.settings, self.contested), search)
+        return Confirmed(found, search)
 
     @one_blas_thread()
     def refine(self, image: np.ndarray, targets: Sequence[Target]) -> list[Target]:
@@ -131,7 +136,7 @@ def _with_faint_parts(
         seen = seen.select(seen.certain)
         x, y = view.x + part.x, view.y + part.y
         seen = replace(seen, frames=frame.translated(seen.frames, x, y))
-        new = ~seen.on_dots(found.select(found.certain))
+        new = ~seen.on_dots(found.frames[found.certain])
         found = Hypotheses.joined([found, seen.select(new)])
     return found
 
@@ -199,8 +204,8 @@ def read_pyramid(
     Without families that are known to be shown, a glance at the clearest dots tells them, or a
     closer look in the end. Dots that were left unread until then are read with these.
     """
-    described: Sequence[RingPrint] = settings.codes(RingPrint)
-    families, polarities = described, settings.polarities
+    families: Sequence[RingPrint] = settings.codes(RingPrint)
+    polarities = settings.polarities
     shown = list(families if len(families) == 1 else shown)
     images = pyramid.images
     begin = before if before is not None else Hypotheses.unread(NO_FITS, families[0])
@@ -257,9 +262,41 @@ def read_pyramid(
     read = Hypotheses.joined(seen.found)
     if len(shown) > 1:
         read = contested(read)
-    named = {code.name: code for code in described}
-    as_described = [named[code.name] for code in read.families]
-    return replace(read, families=np.array(as_described, object))
+    return _as_described(read, settings)
+
+
+def read_known(
+    pyramid: ImagePyramid,
+    settings: DetectorSettings,
+    expected: frozenset[int],
+    known: Dots,
+    shown: Sequence[RingPrint],
+) -> Hypotheses:
+    """Return what is read in the places of known dots, px of the image, by the families shown."""
+    families: Sequence[RingPrint] = settings.codes(RingPrint)
+    nothing = Hypotheses.unread(NO_FITS, families[0])
+    seen = _Seen((nothing,), Explained.by(nothing))
+    for octave in octaves(pyramid, *settings.radii):
+        of_octave = dots_of(octave, known)
+        if not len(of_octave.frames):
+            continue
+        gray = octave.pyramid.gray
+        dots = measure_dots(gray, of_octave)
+        families = with_measured_bands(gray, dots, families)
+        dots = measure_dots(gray, dots, covariances=True)
+        dots = dots.select(dots.share >= ENOUGH)
+        by_name = {code.name: code for code in families}
+        codes = [by_name[code.name] for code in shown]
+        prior = seen.prior(expected, octave.level)
+        read = read_families(gray, dots, codes, prior)
+        seen = seen.after(at_full_size(pyramid.images[: octave.level + 1], read))
+    return _as_described(Hypotheses.joined(seen.found), settings)
+
+
+def _as_described(read: Hypotheses, settings: DetectorSettings) -> Hypotheses:
+    """Return hypotheses of families as they are described, not as their bands were measured."""
+    named = {code.name: code for code in settings.codes(RingPrint)}
+    return replace(read, families=np.array([named[it.name] for it in read.families], object))
 
 
 def _proposed(

@@ -98,11 +98,11 @@ class Hypotheses(ArrayRecord):
         _, minor, _ = frame.ellipse_axes(self.frames)
         return minor * np.array([code.band_outer for code in self.families])
 
-    def on_dots(self, others: Hypotheses) -> np.ndarray:
-        """Return whether centres lie on the dots of others, ndarray of bool, shape (k,)."""
-        away = self.frames[:, None, :2, 2] - others.frames[:, :2, 2]
-        radii = frame.mean_radii(others.frames)
-        return np.asarray((np.hypot(away[..., 0], away[..., 1]) < radii).any(axis=1))
+    def on_dots(self, frames: np.ndarray) -> np.ndarray:
+        """Return whether centres lie on dots with frames (n, 3, 3), ndarray of bool, (k,)."""
+        away = self.frames[:, None, :2, 2] - frames[:, :2, 2]
+        near = np.hypot(away[..., 0], away[..., 1]) < frame.mean_radii(frames)
+        return np.asarray(near.any(axis=1))
 
     @staticmethod
     def of(fit: Fit, words: Words, family: RingPrint) -> Hypotheses:

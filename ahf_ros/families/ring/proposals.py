@@ -77,17 +77,12 @@ def propose_small(octave: Octave, polarities: Sequence[int], explained: Explaine
     return dots.select(frame.ellipse_axes(dots.frames)[1] < _THIN)
 
 
-def proposing(known: Dots) -> Proposal:
-    """Return what proposes dots that are known, in px of the image, and searches for none."""
-
-    def propose_known(octave: Octave, polarities: Sequence[int], _explained: Explained) -> Dots:
-        size = frame.mean_radii(known.frames) / 2**octave.level
-        low, high = octave.radii
-        of_octave = (size < high) & ((size >= low) | (octave.level == 0))
-        dots = known.select(of_octave & np.isin(known.polarity, polarities))
-        return replace(dots, frames=frame.enlarged(dots.frames, -octave.level))
-
-    return propose_known
+def dots_of(octave: Octave, known: Dots) -> Dots:
+    """Return the known dots, in px of the image, that an octave is to show, in its pixels."""
+    size = frame.mean_radii(known.frames) / 2**octave.level
+    low, high = octave.radii
+    dots = known.select((size < high) & ((size >= low) | (octave.level == 0)))
+    return replace(dots, frames=frame.enlarged(dots.frames, -octave.level))
 
 
 PROPOSALS: tuple[Proposal, ...] = (propose_whole, propose_voted, propose_small)
