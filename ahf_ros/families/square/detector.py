@@ -106,7 +106,8 @@ class SquareDetector(ExpectingDetector):
         odds = np.minimum(doubtful.odds, MINIMUM_ODDS)
         odds = np.concatenate([_odds_together(sure, groups), odds])
         readings = replace(Readings.joined([sure, doubtful]), odds=odds)
-        readings = readings.select(np.argsort(-odds, kind='stable'))
+        readings = _of_usual_borders(readings)
+        readings = readings.select(np.argsort(-readings.odds, kind='stable'))
         readings = readings.select(_owning(readings, np.zeros(len(readings.odds), int)))
         decoded = readings.odds > MINIMUM_ODDS
         markers = _markers(readings, decoded, groups)
@@ -234,6 +235,21 @@ def _odds_together(readings: Readings, groups: Groups) -> np.ndarray:
         rivals = -leading[:size].sum()
         against[of_this & (number < size)] = np.logaddexp(-there, rivals)
     return -np.logaddexp(-odds, against)
+
+
+def _of_usual_borders(readings: Readings) -> Readings:
+    """Return one reading of each marker in a place, with the border that most of its group have.
+
+    Paper in shadow beside a border may be taken for half of a wider one.
+    """
+    number, border, unusual = readings.number, readings.border, np.zeros(len(readings.odds), bool)
+    for group in np.unique(readings.group).tolist():
+        own = np.flatnonzero(readings.group == group)
+        best = np.zeros((border.max() + 1, number.max() + 1))
+        np.maximum.at(best, (border[own], number[own]), readings.odds[own])
+        unusual[own] = border[own] != best.sum(axis=1).argmax()
+    ordered = readings.select(np.lexsort([-readings.odds, unusual]))
+    return ordered.select(_owning(ordered, ordered.group * _MANY + ordered.number))
 
 
 def _owning(readings: Readings, kinds: np.ndarray) -> np.ndarray:
