@@ -325,8 +325,8 @@ void cell_evidence(count h, count w, count k, count s, count n, const uint8_t gr
 /* square_words.c */
 
 /* The likeliest of w words in four turns, its log odds and those of others against it, where they
-   are possible. Words have bits, and a prior against them; few edges speak against them as cells,
-   and corners for them as shapes. */
+   are possible, and otherwise a bound of its log odds. Words have bits, and a prior against them; few
+   edges speak against them as cells, and corners for them as shapes. */
 void likeliest_words(count k, count c, count b, count w, const float paper[k][c],
                      const double ink[k], const double square[k], const bool anyway[k],
                      const uint8_t words[b][w][4], const float prior[w], const double few[w],

@@ -191,6 +191,51 @@ static inline double bounded(double odds, double most)
     return lesser(greater(odds, -most), most);
 }
 
+/* Of the cells of a line: half of a step from ink to paper, and the step; odds of paper by the whole
+   cell, and the sum of those by its parts; logarithms of what is more likely than either colour. */
+enum { HALF, STEP, OF_WHOLE, OF_PARTS, WHOLE_AGAINST, PARTS_AGAINST, LINES };
+
+/* Set the step of each cell of a row, the one from ink to paper in its light. */
+static void set_line(count s, count row, const double window[s], double everywhere,
+                     const double sums[SIDES][SUMS][s], const double all[SUMS], struct step least,
+                     double line[LINES][s])
+{
+    count last = s - 2;
+    for (count column = 1; column <= last; column++) {
+        double mean[SUMS];
+        for (int sum = 0; sum < SUMS; sum++)
+            mean[sum] = window[row - 1] * sums[0][sum][column] +
+                        window[last - column] * sums[1][sum][row] +
+                        window[last - row] * sums[2][sum][column] +
+                        window[column - 1] * sums[3][sum][row] + everywhere * all[sum];
+        line[HALF][column] = least.whole > 0 ? least.half : mean[MIDDLES] / mean[TOTAL];
+        line[STEP][column] = least.whole > 0 ? least.whole : mean[STEPS] / mean[TOTAL];
+    }
+}
+
+/* Weigh the cells of a row, several at a time, as all loops are without a branch. */
+static void weigh_line(count s, count row, const double whole[s][s],
+                       const double levels[PARTS][s][s], double sharpness, double most,
+                       double line[LINES][s])
+{
+    for (count c = 1; c < s - 1; c++) {
+        double of = sharpness * (whole[row][c] - line[HALF][c]) / line[STEP][c];
+        line[OF_WHOLE][c] = bounded(of, most);
+        line[OF_PARTS][c] = 0;
+        line[PARTS_AGAINST][c] = 1;
+    }
+    for (int part = 1; part < PARTS; part++)
+        for (count c = 1; c < s - 1; c++) {
+            double of = sharpness * (levels[part][row][c] - line[HALF][c]) / line[STEP][c];
+            line[OF_PARTS][c] += bounded(of, most);
+            line[PARTS_AGAINST][c] *= (1 + exponential(bounded(of, most))) / 2;
+        }
+    for (count c = 1; c < s - 1; c++) {
+        line[WHOLE_AGAINST][c] = logarithm((1 + exponential(line[OF_WHOLE][c])) / 2);
+        line[PARTS_AGAINST][c] = logarithm(line[PARTS_AGAINST][c]);
+    }
+}
+
 /* Logarithmic odds of a square corner: its outermost part is as bright as paper if it is round. */
 static double corner_odds(double outermost, double half, double step, const double shown[2],
                           double sharpness)
@@ -236,28 +281,19 @@ void cell_evidence(count h, count w, count k, count s, count n, const uint8_t gr
                 set_logarithms((PARTS - 1) * s * s, levels[1][0], offset);
             logarithms = true;
             struct step least = least_step(s, whole, usual, minimum_step);
-            for (count row = 1; row <= last; row++)
+            double(*line)[s] = sums[SIDES];
+            for (count row = 1; row <= last; row++) {
+                set_line(s, row, window, everywhere, sums, all, least, line);
+                weigh_line(s, row, whole, levels, sharpness, most, line);
                 for (count column = 1; column <= last; column++) {
-                    double mean[SUMS];
-                    for (int sum = 0; sum < SUMS; sum++)
-                        mean[sum] = window[row - 1] * sums[0][sum][column] +
-                                    window[last - column] * sums[1][sum][row] +
-                                    window[last - row] * sums[2][sum][column] +
-                                    window[column - 1] * sums[3][sum][row] + everywhere * all[sum];
-                    double half = mean[MIDDLES] / mean[TOTAL], step = mean[STEPS] / mean[TOTAL];
-                    if (least.whole > 0)
-                        half = least.half, step = least.whole;
-                    double of_whole = bounded(sharpness * (whole[row][column] - half) / step, most);
-                    double parts = 0, product = 1;
-                    for (int part = 1; part < PARTS; part++) {
-                        double of = sharpness * (levels[part][row][column] - half) / step;
-                        parts += bounded(of, most);
-                        product *= (1 + exponential(bounded(of, most))) / 2;
-                    }
-                    double against = -logarithm((1 + exponential(of_whole)) / 2);
-                    against -= of_part * logarithm(product) + unclear * (1 - fabs(of_whole) / most);
+                    double half = line[HALF][column], step = line[STEP][column];
+                    double of_whole = line[OF_WHOLE][column];
+                    double against = -line[WHOLE_AGAINST][column];
+                    against -= of_part * line[PARTS_AGAINST][column] +
+                               unclear * (1 - fabs(of_whole) / most);
                     count r = row - 1 - border, c = column - 1 - border;
                     if (r >= 0 && r < n && c >= 0 && c < n) {
+                        double parts = line[OF_PARTS][column];
                         paper[reading][i][r][c] = (float)(of_whole + of_part * parts);
                         ink += against;
                         continue;
@@ -271,6 +307,7 @@ void cell_evidence(count h, count w, count k, count s, count n, const uint8_t gr
                         square += bounded(of, most);
                     }
                 }
+            }
             double against = unusual * (reading + (least.whole > 0));
             odds[INK][reading][i] = ink + (around - against);
             odds[SQUARE][reading][i] = square - against;

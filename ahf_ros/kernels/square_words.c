@@ -6,6 +6,7 @@
 #include "kernels.h"
 
 enum { BITS = 8, VALUES = 256, TURNS = 4 };
+#define ROUNDING 1e-3 /* of sums of evidence in single precision, at the most */
 
 /* Logarithmic odds against either of two, from those against each. */
 static double against_both(double a, double b)
@@ -50,7 +51,23 @@ void likeliest_words(count k, count c, count b, count w, const float paper[k][c]
                      int64_t best[k][2], double total[k], double others[k], bool likely[k],
                      float sums[b][256], float odds[w][4])
 {
+    float least_prior = INFINITY;
+    double least_few = INFINITY;
+    for (count word = 0; word < w; word++) {
+        least_prior = lesser_f(prior[word], least_prior);
+        least_few = lesser(few[word], least_few);
+    }
     for (count i = 0; i < k; i++) {
+        double bound = ink[i] - doubt - least_prior - least_few + ROUNDING;
+        for (count cell = 0; cell < c; cell++)
+            bound += greater_f(paper[i][cell], 0);
+        if (!anyway[i] && !(bound > possible)) { /* of a word that has paper where it is likely */
+            best[i][0] = best[i][1] = 0;
+            total[i] = bound;
+            others[i] = 0;
+            likely[i] = false;
+            continue;
+        }
         set_sums(c, b, paper[i], sums);
         for (count word = 0; word < w; word++)
             for (int turn = 0; turn < TURNS; turn++)

@@ -179,6 +179,18 @@ def test_the_likeliest_word_and_all_others(seed: int) -> None:
             assert others == pytest.approx(np.logaddexp.reduce(rest.ravel()), abs=1e-4)
 
 
+def test_no_word_is_likely_where_ink_is_not() -> None:
+    paper, bits = np.full((2, 9), 0.5, np.float32), np.full((2, 3, 4), 255, np.uint8)
+    anyway = np.array([False, True])
+    of_words = bits, *np.ones((3, 3)), 6.0, 7.0, -12.0
+    best, total, _, likely, *_ = kernels.likeliest_words(
+        paper, np.full(2, -20.0), np.zeros(2), anyway, *of_words
+    )
+    assert likely.tolist() == [False, True]
+    assert best.tolist() == [[0, 0]] * 2
+    assert total[1] < total[0] < -12
+
+
 @pytest.mark.parametrize('bad', [0.0, math.nan, math.inf, -1e30])
 def test_bad_values_end(bad: float) -> None:
     gray, frames = np.zeros((1, 1), np.uint8), np.full((3, 3, 3), bad)
