@@ -315,6 +315,18 @@ def test_light_may_change_within_markers_by_less_than_ink(light: str, detect: De
     assert wrong == false == 0
 
 
+@pytest.mark.parametrize(('seed', 'radius'), [(901, 16.0), (902, 24.0)])
+def test_paper_in_shadow_makes_no_border_wider(seed: int, radius: float) -> None:
+    family = 'apriltag_16h5'
+    size = {'width': 1600, 'height': 1200, 'targets': 20, 'dot_radius': radius}
+    shown = scene(family, **size, light='lattice', ambient=0.12, seed=seed)
+    found = create_detector(family=family)(shown.image)
+    places = {it.id: (it.x, it.y) for it in shown.targets}
+    assert len(found) >= 16
+    assert {it.border for it in found} == {1}
+    assert max(np.hypot(*np.subtract((it.x, it.y), places[it.id])) for it in found) < 0.1
+
+
 @pytest.mark.parametrize('light', ['stripe', 'lattice', 'fringe'])
 def test_places_are_those_of_the_image_as_received(light: str, detect: Detector) -> None:
     shown = scene(light=light, ambient=0.3)
