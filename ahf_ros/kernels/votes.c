@@ -125,7 +125,7 @@ void highest_cells(count n, const int64_t cells[n], const float values[n], int64
         highest[i] = is_highest(n, cells, values, wide, reach, i);
 }
 
-/* The first cell of a row, from one on, with more votes than its own need be; `wide` without any. */
+/* The first cell of a row, from one on, with more votes than `own`; `wide` if there is none. */
 static inline count next_above(count wide, const uint16_t votes[wide], count from, float own)
 {
     for (; from + RUN <= wide; from += RUN) { /* most cells have none */
@@ -158,7 +158,7 @@ void vote_peaks(count rows, count wide, count most, const uint16_t votes[rows][w
             read_square(rows, wide, votes, 3, r - 1, c - 1, beside);
             if (!(weighted(3, beside, 1, 1) > needed))
                 continue;
-            /* Of two blocks to each side of its own, and where it is there. */
+            /* Its block with two to each side, and where the cell is among theirs. */
             count down = 4 + r % 2, right = 4 + c % 2;
             read_square(rows, wide, votes, AROUND, r - down, c - right, around);
             leave_whole(enough, around, whole);

@@ -256,9 +256,9 @@ class _Bands:
 
         The second is that of bands which may be moved beside their dots.
         """
-        ways = [steps, self._moved(steps)]
-        paths = self.scores(np.stack(ways, axis=1), long=True).astype(np.float64)
-        return paths[:, 0], paths[:, -1]
+        ways = np.stack([steps, self._moved(steps)], axis=1)
+        stiff, moved = self.scores(ways, long=True).astype(np.float64).T
+        return stiff, moved
 
     def _paths(self, steps: np.ndarray, *, long: bool = False) -> tuple[Any, ...]:
         """Return what paths along words meet."""

@@ -79,9 +79,10 @@ class RingDetector(PyramidDetector):
         """Return what an image shows in the places of targets; see `Confirming`."""
         check_image(image)
         pyramid = bare_pyramid(as_gray(image), self.settings.max_radius)
+        described = {code.name for code in self.design}
+        targets = [it for it in targets if it.family in described]
         names = {it.family for it in targets}
         shown = [code for code in self.design if code.name in names]
-        targets = [it for it in targets if it.family in {code.name for code in shown}]
         signs = np.array([it.polarity for it in targets], int)
         dots = Dots(frames_of(targets), signs, np.ones(len(signs)))
         of_image = pyramid, self.settings, self.expected

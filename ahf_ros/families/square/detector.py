@@ -108,7 +108,7 @@ class SquareDetector(ExpectingDetector):
         readings = replace(Readings.joined([sure, doubtful]), odds=odds)
         readings = _of_usual_borders(readings)
         readings = readings.select(np.argsort(-readings.odds, kind='stable'))
-        readings = readings.select(_owning(readings, np.zeros(len(readings.odds), int)))
+        readings = readings.select(_owning(readings))
         decoded = readings.odds > MINIMUM_ODDS
         markers = _markers(readings, decoded, groups)
         return sorted_targets(
@@ -183,8 +183,7 @@ def _are_read(places: np.ndarray, readings: Readings) -> np.ndarray:
 def _laid(gray: np.ndarray, readings: Readings, groups: Groups) -> np.ndarray:
     """Return the corners of prints that lie over the image where readings are doubtful."""
     readings = readings.select(np.argsort(-readings.odds, kind='stable'))
-    alike = readings.group * _MANY + readings.number
-    own = readings.select(_owning(readings, alike) & (readings.odds <= MINIMUM_ODDS))
+    own = readings.select(_owning(readings, of_print=True) & (readings.odds <= MINIMUM_ODDS))
     parts: dict[int, list[tuple[np.ndarray, np.ndarray]]] = {}
     for index, width in sorted(set(zip(own.group.tolist(), own.border.tolist(), strict=True))):
         alike = own.select((own.group == index) & (own.border == width))
@@ -249,11 +248,12 @@ def _of_usual_borders(readings: Readings) -> Readings:
         np.maximum.at(best, (border[own], number[own]), readings.odds[own])
         unusual[own] = border[own] != best.sum(axis=1).argmax()
     ordered = readings.select(np.lexsort([-readings.odds, unusual]))
-    return ordered.select(_owning(ordered, ordered.group * _MANY + ordered.number))
+    return ordered.select(_owning(ordered, of_print=True))
 
 
-def _owning(readings: Readings, kinds: np.ndarray) -> np.ndarray:
-    """Return which readings, the best first, are the first of their kind, (k,), in a place."""
+def _owning(readings: Readings, *, of_print: bool = False) -> np.ndarray:
+    """Return which readings, the best first, are the first in a place, or of a print there."""
+    kinds = of_print * (readings.group * _MANY + readings.number)
     owning: np.ndarray = kernels.place_owners(*_places_of(readings.corners), kinds, len(kinds))
     return owning
 
