@@ -372,16 +372,3 @@ def test_edges_of_over_exposed_targets_are_shifted(overexposure: float) -> None:
     (figures, shifts), (_, as_printed) = seen(overexposure=overexposure), seen(polarity='dark')
     assert counts(figures) == (20, 0, 0)
     assert np.median([*shifts.values()]) < np.median([*as_printed.values()]) - 0.1
-
-
-def test_what_is_confirmed_is_what_was_known() -> None:
-    scene = rendered(SMALL)
-    detect = create_detector('ring', settings=DetectorSettings(family=SMALL.family))
-    first, second, *others = detect(scene.image)
-    foreign = replace(second, family='aicon12')
-    mistaken = replace(first, id=second.id, code=second.code)
-    confirmed = detect.confirm(scene.image, [mistaken, foreign, *others])
-    assert {it.id for it in confirmed.targets} == {it.id for it in others}
-    height, width = scene.image.shape
-    found = confirmed.search([(0, 0, width, height)])
-    assert {it.id for it in found} == {it.id for it in (first, second, *others)}

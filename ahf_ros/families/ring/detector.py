@@ -20,8 +20,15 @@ from ahf_ros.families.contract import Confirmed, DetectorSettings, Part
 from ahf_ros.families.pyramid_detector import PyramidDetector
 from ahf_ros.families.ring.bands import with_measured_bands
 from ahf_ros.families.ring.choice import choose_families, further_families
+from ahf_ros.families.ring.confirming import read_known
 from ahf_ros.families.ring.contests import among_others, resolve
-from ahf_ros.families.ring.families import contested, decoded, read_families, settle_same_prints
+from ahf_ros.families.ring.families import (
+    as_described,
+    contested,
+    decoded,
+    read_families,
+    settle_same_prints,
+)
 from ahf_ros.families.ring.full_size import at_full_size
 from ahf_ros.families.ring.hypotheses import Hypotheses
 from ahf_ros.families.ring.known import WHOLE, Explained, Prior
@@ -29,7 +36,6 @@ from ahf_ros.families.ring.parts import ImagePart, dots_in, image_parts
 from ahf_ros.families.ring.proposals import (
     PROPOSALS,
     Proposal,
-    dots_of,
     measure_alike,
     measure_dots,
     measure_likely,
@@ -40,7 +46,7 @@ from ahf_ros.families.ring.refinement import refine_centres
 from ahf_ros.families.undecoded import undecoded
 from ahf_ros.prints.ring import RingPrint
 from ahf_ros.vision import frame
-from ahf_ros.vision.circle_fit import ENOUGH, NO_FITS, Fit
+from ahf_ros.vision.circle_fit import NO_FITS, Fit
 from ahf_ros.vision.dots import Dots
 from ahf_ros.vision.ellipse_targets import frames_of, targets_from_frames
 from ahf_ros.vision.faint import faint_parts
@@ -83,10 +89,8 @@ class RingDetector(PyramidDetector):
         targets = [it for it in targets if it.family in described]
         names = {it.family for it in targets}
         shown = [code for code in self.design if code.name in names]
-        signs = np.array([it.polarity for it in targets], int)
-        dots = Dots(frames_of(targets), signs, np.ones(len(signs)))
         of_image = pyramid, self.settings, self.expected
-        read = read_known(*of_image, dots, shown)
+        read = read_known(*of_image, targets)
         found, known = report(read, self.settings, self.contested), {it.print for it in targets}
         others = [it for it in found if it.print not in known]
         if others:  # one reading of a dot is not enough for what was not seen there before
@@ -264,41 +268,7 @@ def read_pyramid(
     read = Hypotheses.joined(seen.found)
     if len(shown) > 1:
         read = contested(read)
-    return _as_described(read, settings)
-
-
-def read_known(
-    pyramid: ImagePyramid,
-    settings: DetectorSettings,
-    expected: frozenset[int],
-    known: Dots,
-    shown: Sequence[RingPrint],
-) -> Hypotheses:
-    """Return what is read in the places of known dots, px of the image, by the families shown."""
-    families: Sequence[RingPrint] = settings.codes(RingPrint)
-    nothing = Hypotheses.unread(NO_FITS, families[0])
-    seen = _Seen((nothing,), Explained.by(nothing))
-    for octave in octaves(pyramid, *settings.radii):
-        of_octave = dots_of(octave, known)
-        if not len(of_octave.frames):
-            continue
-        gray = octave.pyramid.gray
-        dots = measure_dots(gray, of_octave)
-        families = with_measured_bands(gray, dots, families)
-        dots = measure_dots(gray, dots, covariances=True)
-        dots = dots.select(dots.share >= ENOUGH)
-        by_name = {code.name: code for code in families}
-        codes = [by_name[code.name] for code in shown]
-        prior = seen.prior(expected, octave.level)
-        read = read_families(gray, dots, codes, prior)
-        seen = seen.after(at_full_size(pyramid.images[: octave.level + 1], read))
-    return _as_described(Hypotheses.joined(seen.found), settings)
-
-
-def _as_described(read: Hypotheses, settings: DetectorSettings) -> Hypotheses:
-    """Return hypotheses of families as they are described, not as their bands were measured."""
-    named = {code.name: code for code in settings.codes(RingPrint)}
-    return replace(read, families=np.array([named[it.name] for it in read.families], object))
+    return as_described(read, settings.codes(RingPrint))
 
 
 def _proposed(

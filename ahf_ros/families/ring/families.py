@@ -82,6 +82,12 @@ def decoded(hypotheses: Hypotheses) -> tuple[np.ndarray, np.ndarray, np.ndarray]
     return names, codes, ids
 
 
+def as_described(read: Hypotheses, families: Sequence[RingPrint]) -> Hypotheses:
+    """Return hypotheses of families as they are described, not as their bands were measured."""
+    named = {code.name: code for code in families}
+    return replace(read, families=np.array([named[it.name] for it in read.families], object))
+
+
 def words_shown(
     hypotheses: Hypotheses, families: Sequence[RingPrint]
 ) -> list[dict[RingPrint, int]]:

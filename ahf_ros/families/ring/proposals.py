@@ -77,14 +77,6 @@ def propose_small(octave: Octave, polarities: Sequence[int], explained: Explaine
     return dots.select(frame.ellipse_axes(dots.frames)[1] < _THIN)
 
 
-def dots_of(octave: Octave, known: Dots) -> Dots:
-    """Return the known dots, in px of the image, that an octave is to show, in its pixels."""
-    size = frame.mean_radii(known.frames) / 2**octave.level
-    low, high = octave.radii
-    dots = known.select((size < high) & ((size >= low) | (octave.level == 0)))
-    return replace(dots, frames=frame.enlarged(dots.frames, -octave.level))
-
-
 PROPOSALS: tuple[Proposal, ...] = (propose_whole, propose_voted, propose_small)
 """The ways to propose dots, the fastest first."""
 

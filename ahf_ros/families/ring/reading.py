@@ -8,6 +8,7 @@ evidence, words and fit come twice. What else a band may be is asked the second 
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -43,7 +44,7 @@ from ahf_ros.families.ring.polar import (
 )
 from ahf_ros.prints.ring import RingPrint, least_marked
 from ahf_ros.vision import frame
-from ahf_ros.vision.circle_fit import ENOUGH, Fit, fit_circles
+from ahf_ros.vision.circle_fit import ENOUGH, NO_FITS, Fit, fit_circles
 
 PER_SECTOR = 10
 """Angles of a sector at which bands are read."""
@@ -65,71 +66,101 @@ def read_bands(
     Words whose log odds against anything, see `Words.seen`, are not above `least`, shape (k,), are
     not asked for: their dots may be left unread.
     """
-    least = np.full(len(dots.frames), -np.inf) if least is None else least
-    starts = range(0, max(len(dots.frames), 1), PART)
-    parts = [slice(start, start + PART) for start in starts]
-    return Hypotheses.joined(
-        [_read_part(gray, dots.select(part), family, prior, least[part]) for part in parts]
-    )
-
-
-def _read_part(
-    gray: np.ndarray, dots: Fit, family: RingPrint, prior: Prior, least: np.ndarray
-) -> Hypotheses:
     unread = Hypotheses.unread(dots, family)
-    if not len(dots.frames):
-        return unread
-    hopeful = HOPEFUL * min(1.0, least_marked(family) / FEW_MARKS)
+    least = np.full(len(dots.frames), -np.inf) if least is None else least
+    for part in _parts(dots):
+        drafted, drafts = _drafts(gray, dots.select(part), family, prior)
+        found = _read_part(gray, drafts, family, prior, least[part][drafted])
+        read = found.words > 0
+        unread = unread.replaced(part[drafted[read]], found.select(read))
+    return unread
+
+
+def read_printed(
+    gray: np.ndarray, printed: Fit, family: RingPrint, prior: Prior = NOTHING_KNOWN
+) -> Hypotheses:
+    """Read the bands of targets whose printed dots are known, and by how much edges have shifted.
+
+    These are as good as drafts: bands are read once. There is one hypothesis of each target.
+    """
+    parts = (printed.select(part) for part in _parts(printed))
+    read = [_read_part(gray, part, family, prior) for part in parts]
+    return Hypotheses.joined([Hypotheses.unread(NO_FITS, family), *read])
+
+
+def _parts(dots: Fit) -> Iterator[np.ndarray]:
+    """Yield the indices of as many dots as are read at a time."""
+    every = np.arange(len(dots.frames))
+    for start in range(0, len(every), PART):
+        yield every[start : start + PART]
+
+
+def _drafts(
+    gray: np.ndarray, dots: Fit, family: RingPrint, prior: Prior
+) -> tuple[np.ndarray, Fit]:
+    """Return which dots have a band that may show a word, and their fits with it, indices (n,)."""
     polar = polar_images(gray, dots, family.band, family.bits * PER_SECTOR)
     polar = on_dark_ground(polar, family.band)
     growth = best_growth(polar, family.band, prior)
     edges = edge_evidence(polar, 1 - growth, growth, family.band, SHARES)
     words = decode(edges, _overhang(growth, family), family, prior.expected, draft=True)
-    read = np.flatnonzero(_mean_odds(words, edges.weight) > hopeful)
-    if not read.size:
-        return unread
-    edges, growth = edges.select(read), growth[read]
-    printed = dots.select(read)
+    drafted = np.flatnonzero(_mean_odds(words, edges.weight) > _hopeful(family))
+    if not drafted.size:
+        return drafted, NO_FITS
+    edges, growth = edges.select(drafted), growth[drafted]
+    printed = dots.select(drafted)
     printed = replace(printed, frames=frame.scaled(printed.frames, 1 - growth))
     # In the frame of the printed dot, the same growth is a larger share.
-    some = polar.select(read), edges, words.select(read)
+    some = polar.select(drafted), edges, words.select(drafted)
     growth = growth / (1 - growth)
     words = _settled(gray, printed, *some, growth, family, prior.expected, draft=True)
-    good = _mean_odds(words, edges.weight) > hopeful
+    good = _mean_odds(words, edges.weight) > _hopeful(family)
     if not good.any():
-        return unread
-    read, growth = read[good], growth[good]
+        return drafted[good], NO_FITS
+    drafted, growth = drafted[good], growth[good]
     printed, words = printed.select(good), words.select(good)
     fit = _joint_fit(gray, printed, words, PER_SECTOR // 2, 1, family)
-    fit = _by_dot(fit, printed, growth, _thin(printed, growth, family))
+    return drafted, _by_dot(fit, printed, growth, _thin(printed, growth, family))
+
+
+def _read_part(
+    gray: np.ndarray,
+    fit: Fit,
+    family: RingPrint,
+    prior: Prior,
+    least: np.ndarray | float = -np.inf,
+) -> Hypotheses:
+    """Return what bands are read as in the frames of their drafts; see `read_bands`."""
+    unread = Hypotheses.unread(fit, family)
+    if not len(fit.frames):
+        return unread
     # A dot and its band are not printed and grown alike: each is read where it was seen.
     printed = np.abs(fit.proportion - 1) < _PROPORTION
     bands = replace(fit, frames=frame.scaled(fit.frames, np.where(printed, fit.proportion, 1)))
     growth = fit.polarity * fit.edge_shift / bands.size
     polar = polar_images(gray, bands, family.band, family.bits * PER_SECTOR)
     polar = on_dark_ground(polar, family.band, fit.share >= ENOUGH)
-    edges = edge_evidence(polar, np.ones(len(read)), growth, family.band, SHARES)
+    edges = edge_evidence(polar, np.ones(len(growth)), growth, family.band, SHARES)
     words = decode(edges, _overhang(growth, family), family, prior.expected)
     # What is seen against anything is that of edges alone, whatever else there is.
-    enough = _of_reading(words.seen, words, edges.weight) > hopeful
-    asked = np.flatnonzero(enough & (words.seen > least[read]))
+    enough = _of_reading(words.seen, words, edges.weight) > _hopeful(family)
+    asked = np.flatnonzero(enough & (words.seen > least))
     if not asked.size:
         return unread
-    if asked.size < read.size:
-        read, growth = read[asked], growth[asked]
-        fit, bands = fit.select(asked), bands.select(asked)
+    if asked.size < enough.size:
+        growth, fit, bands = growth[asked], fit.select(asked), bands.select(asked)
         polar, edges, words = polar.select(asked), edges.select(asked), words.select(asked)
     overhang = _overhang(growth, family)
     words = _settled(gray, bands, polar, edges, words, growth, family, prior.expected, draft=False)
     words = with_ends(polar, words, overhang, family)
     words = replace(words, unlike=unlike_print(polar, words, growth, overhang, family))
-    good = _mean_odds(words, edges.weight) > hopeful
+    good = _mean_odds(words, edges.weight) > _hopeful(family)
     if not good.any():
         return unread
-    read, dots, words = read[good], fit.select(good), words.select(good)
-    fit = _joint_fit(gray, dots, words, PER_SECTOR, 2, family)
-    fit = _by_dot(fit, dots, growth[good], _thin(dots, growth[good], family))
-    return unread.replaced(read, rated(Hypotheses.of(fit, words, family)))
+    drafts, words, growth = fit.select(good), words.select(good), growth[good]
+    fit = _joint_fit(gray, drafts, words, PER_SECTOR, 2, family)
+    fit = _by_dot(fit, drafts, growth, _thin(drafts, growth, family))
+    return unread.replaced(asked[good], rated(Hypotheses.of(fit, words, family)))
 
 
 def best_growth(
@@ -225,6 +256,11 @@ def _by_dot(fit: Fit, printed: Fit, growth: np.ndarray, which: np.ndarray) -> Fi
         covariance=np.where(known, printed.covariance, fit.covariance),
     )
     return fit.replaced(which, alone.select(which))
+
+
+def _hopeful(family: RingPrint) -> float:
+    """Return the mean log odds of a reading from which a band may show a word."""
+    return HOPEFUL * min(1.0, least_marked(family) / FEW_MARKS)
 
 
 def _mean_odds(words: Words, weight: np.ndarray) -> np.ndarray:
