@@ -38,9 +38,9 @@ WHEELS := .venv-wheels
 unexport AMENT_PREFIX_PATH CMAKE_PREFIX_PATH LD_LIBRARY_PATH PYTHONPATH
 unexport _ROS_WHEELS_BOOTSTRAP_COMPLETE
 
-.PHONY: demo nodes wheels test lint site test-native test-live test-commands test-computing test-detectors \
-	coverage test-oldest test-portable test-sanitized test-aarch64 test-kilted test-colcon \
-	yardstick browser clean
+.PHONY: demo nodes wheels test lint site test-native test-live test-detectors test-files \
+	test-commands test-computing coverage test-oldest test-portable test-sanitized test-aarch64 \
+	test-kilted test-colcon yardstick browser clean
 .DELETE_ON_ERROR:
 
 demo: $(INSTALLED)
@@ -48,9 +48,9 @@ demo: $(INSTALLED)
 
 nodes: $(NODES)
 
-# The longest first, and none so long that it ends alone: two cores end at the same time.
-test: test-live test-oldest yardstick test-detectors coverage site lint test-portable \
-	test-sanitized test-aarch64
+# The longest first, so that none ends alone: two cores end at the same time.
+test: test-computing test-detectors test-live test-oldest coverage yardstick lint site \
+	test-portable test-sanitized test-aarch64
 
 lint: $(READY)
 	$(BIN)/ruff check .
@@ -61,27 +61,33 @@ lint: $(READY)
 site: $(READY)
 	$(BIN)/python scripts/build_site.py build/site
 
-test-native: test-live test-detectors test-commands test-computing
+test-native: test-live test-detectors test-files test-commands test-computing
 
-# What runs nodes, what runs commands, what identifies targets in many images, and the rest.
+# What runs nodes, what identifies targets in many images, what reads and writes files, what runs
+# commands, and the rest.
 LIVE = test/nodes test/test_every_way.py
-COMMANDS = test/bag test/batch test/cli
 DETECTORS = test/benchmarks test/families
+FILES = test/base test/clouds test/files test/test_readers.py \
+	$(wildcard test/network/*_files.py test/network/test_*export*.py)
+COMMANDS = test/bag test/batch test/cli
 
 test-live: $(READY)
 	$(BIN)/python -m pytest $(LIVE)
-
-test-commands: $(READY)
-	$(BIN)/coverage run -m pytest $(COMMANDS)
 
 test-detectors: $(READY)
 	$(BIN)/python -m pytest $(DETECTORS)
 
 test-computing: $(READY) | $(if $(CI),browser)
-	$(BIN)/coverage run -m pytest $(patsubst %,--ignore %,$(LIVE) $(COMMANDS) $(DETECTORS))
+	$(BIN)/python -m pytest $(patsubst %,--ignore %,$(LIVE) $(DETECTORS) $(FILES) $(COMMANDS))
+
+test-commands: $(READY)
+	$(BIN)/coverage run -m pytest $(COMMANDS)
+
+test-files: $(READY)
+	$(BIN)/coverage run -m pytest $(FILES)
 
 # Lines and branches of what reads and writes files that these two run, in their own processes.
-coverage: test-commands test-computing
+coverage: test-commands test-files
 	$(BIN)/coverage combine --quiet
 	$(BIN)/coverage report
 

@@ -25,7 +25,9 @@ class BuildKernels(build_ext):
         return fullname.replace('.', os.sep) + LIBRARY.suffix
 
     def build_extension(self, ext: Extension) -> None:
-        """Compile the library."""
+        """Compile the library, if it does not belong where the sources are."""
+        if self.editable_mode:
+            return
         library = Path(self.get_ext_fullpath(ext.name))
         library.parent.mkdir(parents=True, exist_ok=True)
         platform = self.plat_name.replace('-', '_').replace('.', '_')

@@ -51,10 +51,11 @@ def leading(
     """
     ahead = certain.copy()
     for index in np.flatnonzero(certain).tolist():
-        others = certain & rivals(index)
-        others[index] = False
-        enough = np.minimum(times * scores[others], scores[others] + lead)
-        ahead[index] = (scores[index] >= enough).all()
+        others = np.flatnonzero(certain & rivals(index))
+        others = others[others != index]
+        if others.size:
+            enough = np.minimum(times * scores[others], scores[others] + lead)
+            ahead[index] = (scores[index] >= enough).all()
     return ahead
 
 

@@ -155,6 +155,7 @@ def nodes() -> Iterator[subprocess.Popen]:
     assert process.wait(PATIENCE) == 0
 
 
+@pytest.mark.lasting
 def test_every_driver_has_positions_and_registered_clouds_with_the_rig(
     graph: Any, nodes: subprocess.Popen
 ) -> None:

@@ -135,6 +135,7 @@ class PoseProcess:
         self.graph.until(posed)
 
 
+@pytest.mark.lasting
 def test_no_message_is_lost_at_100_hz_and_poses_are_those_of_the_camera(
     graph: Any, tmp_path: Path
 ) -> None:

@@ -100,6 +100,7 @@ def test_the_start_what_has_no_effect_and_the_quality_of_service(graph: Any) -> 
         graph.node.destroy_publisher(publisher)
 
 
+@pytest.mark.lasting
 def test_what_does_not_arrive_is_named_with_the_reason_and_the_remedy(graph: Any) -> None:
     node = graph.node
     given = overrides(image_timeout=0.1, cloud='true', cloud_tolerance=0.001)

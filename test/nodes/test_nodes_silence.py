@@ -64,6 +64,7 @@ def wait(graph: Graph, seconds: float) -> None:
     graph.until(lambda: time.monotonic() > limit)
 
 
+@pytest.mark.lasting
 def test_an_hour_of_a_triggered_scanner_has_no_warning_and_its_end_has_one(
     graph: Graph, tmp_path: Path
 ) -> None:
