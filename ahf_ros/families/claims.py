@@ -51,9 +51,9 @@ def leading(
     """
     ahead = certain.copy()
     for index in np.flatnonzero(certain).tolist():
-        others = np.flatnonzero(certain & rivals(index))
-        others = others[others != index]
-        if others.size:
+        others = certain & rivals(index)
+        others[index] = False
+        if others.any():
             enough = np.minimum(times * scores[others], scores[others] + lead)
             ahead[index] = (scores[index] >= enough).all()
     return ahead

@@ -166,20 +166,20 @@ def _where(image: np.ndarray, known: Sequence[Target]) -> list[Target]:
         around = _cut(image, x, y, half + reach, size)
         if around is not None:
             of[:] = cv2.matchTemplate(around, _dot(it, x, y, half, size), cv2.TM_CCOEFF_NORMED)
-    told = likeness[np.isfinite(likeness).all(axis=(1, 2))]
-    if not len(told):
+    told = np.isfinite(likeness).all(axis=(1, 2))
+    if not told.any():
         return list(known)
-    common = np.mean([cv2.dilate(it, np.ones((3, 3), np.uint8)) for it in told], axis=0)
+    beside = np.ones((3, 3), np.uint8)
+    common = np.mean([cv2.dilate(it, beside) for it in likeness[told]], axis=0)
     row, column = divmod(int(common.argmax()), side)
     row, column = (min(max(it, _BESIDE), side - 1 - _BESIDE) for it in (row, column))
-    near = slice(row - _BESIDE, row + _BESIDE + 1), slice(column - _BESIDE, column + _BESIDE + 1)
-    places = []
-    for it, of in zip(known, likeness, strict=True):
-        own = of + common if np.isfinite(of).all() else common
-        down, across = divmod(int(own[near].argmax()), 2 * _BESIDE + 1)
-        x, y = column - _BESIDE + across - reach, row - _BESIDE + down - reach
-        places.append(_displaced(it, size * x, size * y))
-    return places
+    near = np.s_[:, row - _BESIDE : row + _BESIDE + 1, column - _BESIDE : column + _BESIDE + 1]
+    best = (likeness[told] + common)[near].reshape(told.sum(), -1).argmax(axis=1)
+    moved = np.empty((len(known), 2), int)
+    moved[told] = np.column_stack([best % (2 * _BESIDE + 1), best // (2 * _BESIDE + 1)])
+    moved[~told] = np.rint(np.median(moved[told], axis=0))
+    moved += np.array([column, row]) - _BESIDE - reach
+    return [_displaced(it, *of) for it, of in zip(known, (size * moved).tolist(), strict=True)]
 
 
 def _dot(target: Target, x: int, y: int, half: int, size: int) -> np.ndarray:

@@ -34,4 +34,4 @@ def test_known_targets_are_confirmed_under_a_pattern_that_moves_over_them() -> N
         figures = score(scene, detect.confirm(scene.image, known).targets)
         assert not figures.wrong
         confirmed += figures.right
-    assert confirmed >= 0.97 * WALL.phases * WALL.targets  # 0.99; 0.90 in the shapes of dots
+    assert confirmed >= 0.97 * WALL.phases * WALL.targets  # 142 of 144; 130 in the shapes of dots

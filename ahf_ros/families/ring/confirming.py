@@ -49,12 +49,14 @@ def read_known(
             continue
         gray = octave.pyramid.gray
         frames = frame.enlarged(known.frames[which], -octave.level)
-        dots = measure_dots(gray, replace(known.select(which), frames=frames), covariances=True)
-        families = with_measured_bands(gray, dots, families)
-        seen = dots.share >= ENOUGH
-        dots, which = dots.select(seen), which[seen]
+        first = measure_dots(gray, replace(known.select(which), frames=frames), covariances=True)
+        families = with_measured_bands(gray, first, families)
+        seen = first.share >= ENOUGH
+        first, which = first.select(seen), which[seen]
+        dots = measure_dots(gray, first, covariances=True)  # as a search has them
+        printed = _printed(first, frames[seen])
         prior = Prior.after(expected, found.edge_shift[found.certain] / 2**octave.level)
-        read = _read(gray, dots, frames[seen], names[which], families, prior)
+        read = _read(gray, printed, dots, names[which], families, prior)
         read = at_full_size(pyramid.images[: octave.level + 1], read)
         found = Hypotheses.joined([found, read])
     return as_described(found, settings.codes(RingPrint))
@@ -69,14 +71,13 @@ def _of_octave(octave: Octave, known: Dots) -> np.ndarray:
 
 def _read(
     gray: np.ndarray,
+    printed: Fit,
     dots: Fit,
-    frames: np.ndarray,
     names: np.ndarray,
     families: Sequence[RingPrint],
     prior: Prior,
 ) -> Hypotheses:
-    """Return what is read about dots, in the frames before first, (k, 3, 3); see `read_known`."""
-    printed = _printed(dots, frames)
+    """Return what is read in known frames, or about dots where that leaves a doubt."""
     codes = [code for code in families if code.name in names]
     rest, found = np.ones(len(names), bool), []
     for code in codes:
@@ -91,7 +92,7 @@ def _read(
 
 
 def _printed(dots: Fit, frames: np.ndarray) -> Fit:
-    """Return dots in known frames of their prints, whose edges have all shifted alike."""
+    """Return dots in the frames that their prints had, where they are, all edges shifted alike."""
     at_dots = frames.copy()
     at_dots[:, :2, 2] = dots.frames[:, :2, 2]
     grown = dots.polarity * (dots.size - frame.mean_radii(frames))

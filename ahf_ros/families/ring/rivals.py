@@ -19,13 +19,13 @@ from ahf_ros.families.ring.hypotheses import Hypotheses
 from ahf_ros.families.ring.known import Prior
 from ahf_ros.families.ring.likelihood import SHARES, edge_evidence
 from ahf_ros.families.ring.polar import polar_images
-from ahf_ros.families.ring.reading import read_bands
+from ahf_ros.families.ring.reading import best_growth, read_bands
 from ahf_ros.prints.ring import FAMILY_NAMES, RingPrint, family
 from ahf_ros.vision.circle_fit import Fit
 
 _FIRST = 8  # doubtful words that rivals read first
 _MORE_SEEN = 6.0  # log odds against anything, by which a family that is not read beats one that is
-_BELOW = 2.0  # bound below the evidence of a word, as other words place bands a little elsewhere
+_BELOW, _SHARE_BELOW = 5.0, 0.05  # bound below the evidence of a word, as dots alone place bands
 _ANGLES = 240  # of polar images that all numbers of sectors share
 _PHASES = 12  # of sectors, within one of them
 _PARTS = 2  # of a sector, each of which may be covered
@@ -60,17 +60,12 @@ def _beaten(
 ) -> np.ndarray:
     """Return whether any of the rivals explains the bands of words better, shape (k,)."""
     beaten = np.zeros(len(words.words), bool)
-    placed = replace(
-        dots,
-        frames=words.frames,
-        edge_shift=words.edge_shift,
-        proportion=np.ones(len(beaten)),
-    )
     for band in dict.fromkeys(code.band for code in rivals):
         of_band = [code for code in rivals if code.band == band]
-        ceilings = word_ceilings(gray, placed, band, [code.bits for code in of_band])
+        least = words.seen - np.minimum(_BELOW, _SHARE_BELOW * words.seen)
+        ceilings = word_ceilings(gray, dots, band, [code.bits for code in of_band], prior)
         for code, ceiling in zip(of_band, ceilings, strict=True):
-            asked = np.flatnonzero((ceiling > words.seen - _BELOW) & ~beaten)
+            asked = np.flatnonzero((ceiling > least) & ~beaten)
             if not asked.size:
                 continue
             word = words.select(asked)
@@ -81,13 +76,12 @@ def _beaten(
 
 
 def word_ceilings(
-    gray: np.ndarray, printed: Fit, band: tuple[float, float], numbers: Sequence[int]
+    gray: np.ndarray, dots: Fit, band: tuple[float, float], numbers: Sequence[int], prior: Prior
 ) -> np.ndarray:
     """Return bounds of the log odds of words against anything, by numbers of sectors, (n, k)."""
-    polar = polar_images(gray, printed, band, _ANGLES)
-    growth = printed.polarity * printed.edge_shift / printed.size
-    edges = edge_evidence(polar, np.ones(len(growth)), growth, band, SHARES)
-    edges = without_outliers(edges)
+    polar = polar_images(gray, dots, band, _ANGLES)
+    growth = best_growth(polar, band, prior)
+    edges = without_outliers(edge_evidence(polar, 1 - growth, growth, band, SHARES))
     either = edges.looks.max(axis=1)
     sums = np.cumsum(np.tile([edges.paper, edges.ink, either], 3), axis=2, dtype=np.float64)
 
