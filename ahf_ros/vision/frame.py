@@ -132,6 +132,13 @@ def translated(frames: np.ndarray, x: float, y: float) -> np.ndarray:
     return np.array([[1.0, 0, x], [0, 1.0, y], [0, 0, 1.0]]) @ frames
 
 
+def centred(frames: np.ndarray, centres: np.ndarray) -> np.ndarray:
+    """Return the frames of dots in the same shapes about other centres, shape (..., 2)."""
+    moved = frames.copy()
+    moved[..., :2, 2] = centres
+    return moved
+
+
 def scaled(frames: np.ndarray, factor: np.ndarray) -> np.ndarray:
     """Return the frames of dots of other radii about the same centres, factors (k,)."""
     changed = frames.copy()

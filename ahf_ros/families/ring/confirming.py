@@ -52,6 +52,8 @@ def read_known(
         first = measure_dots(gray, replace(known.select(which), frames=frames), covariances=True)
         families = with_measured_bands(gray, first, families)
         seen = first.share >= ENOUGH
+        if not seen.any():
+            continue
         first, which = first.select(seen), which[seen]
         dots = measure_dots(gray, first, covariances=True)  # as a search has them
         printed = _printed(first, frames[seen])
@@ -88,13 +90,15 @@ def _read(
         found.append(read.select(read.certain))
     if rest.any():
         found.append(read_families(gray, dots.select(rest), codes, prior))
-    return Hypotheses.joined([Hypotheses.unread(NO_FITS, families[0]), *found])
+    return Hypotheses.joined(found)
 
 
 def _printed(dots: Fit, frames: np.ndarray) -> Fit:
     """Return dots in the frames that their prints had, where they are, all edges shifted alike."""
-    at_dots = frames.copy()
-    at_dots[:, :2, 2] = dots.frames[:, :2, 2]
-    grown = dots.polarity * (dots.size - frame.mean_radii(frames))
-    shift = np.full(len(grown), np.median(grown) if grown.size else 0.0)
-    return replace(dots, frames=at_dots, edge_shift=shift, proportion=np.ones(len(shift)))
+    shift = np.median(dots.polarity * (dots.size - frame.mean_radii(frames)))
+    return replace(
+        dots,
+        frames=frame.centred(frames, dots.frames[:, :2, 2]),
+        edge_shift=np.full(len(frames), shift),
+        proportion=np.ones(len(frames)),
+    )

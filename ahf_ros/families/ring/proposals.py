@@ -129,9 +129,7 @@ def measure_alike(gray: np.ndarray, dots: Dots) -> Fit:
     """
     dots = dots.select(np.argsort(-dots.share, kind='stable')[:_MOST_ALIKE])
     fit = measure_dots(gray, dots, covariances=True)
-    frames = dots.frames.copy()
-    frames[:, :2, 2] = fit.frames[:, :2, 2]
-    return replace(fit, frames=frames)
+    return replace(fit, frames=frame.centred(dots.frames, fit.frames[:, :2, 2]))
 
 
 def _fit(gray: np.ndarray, dots: Dots | Fit, *, covariances: bool) -> Fit:

@@ -98,13 +98,13 @@ def _parts(dots: Fit) -> Iterator[np.ndarray]:
 def _drafts(
     gray: np.ndarray, dots: Fit, family: RingPrint, prior: Prior
 ) -> tuple[np.ndarray, Fit]:
-    """Return which dots have a band that may show a word, and their fits with it, indices (n,)."""
+    """Return which dots, indices (n,), have a band that may be a word, and fits with it."""
     polar = polar_images(gray, dots, family.band, family.bits * PER_SECTOR)
     polar = on_dark_ground(polar, family.band)
     growth = best_growth(polar, family.band, prior)
     edges = edge_evidence(polar, 1 - growth, growth, family.band, SHARES)
     words = decode(edges, _overhang(growth, family), family, prior.expected, draft=True)
-    drafted = np.flatnonzero(_mean_odds(words, edges.weight) > _hopeful(family))
+    drafted = np.flatnonzero(_mean_odds(words, edges.weight) > _least_odds(family))
     if not drafted.size:
         return drafted, NO_FITS
     edges, growth = edges.select(drafted), growth[drafted]
@@ -114,7 +114,7 @@ def _drafts(
     some = polar.select(drafted), edges, words.select(drafted)
     growth = growth / (1 - growth)
     words = _settled(gray, printed, *some, growth, family, prior.expected, draft=True)
-    good = _mean_odds(words, edges.weight) > _hopeful(family)
+    good = _mean_odds(words, edges.weight) > _least_odds(family)
     if not good.any():
         return drafted[good], NO_FITS
     drafted, growth = drafted[good], growth[good]
@@ -143,7 +143,7 @@ def _read_part(
     edges = edge_evidence(polar, np.ones(len(growth)), growth, family.band, SHARES)
     words = decode(edges, _overhang(growth, family), family, prior.expected)
     # What is seen against anything is that of edges alone, whatever else there is.
-    enough = _of_reading(words.seen, words, edges.weight) > _hopeful(family)
+    enough = _of_reading(words.seen, words, edges.weight) > _least_odds(family)
     asked = np.flatnonzero(enough & (words.seen > least))
     if not asked.size:
         return unread
@@ -154,7 +154,7 @@ def _read_part(
     words = _settled(gray, bands, polar, edges, words, growth, family, prior.expected, draft=False)
     words = with_ends(polar, words, overhang, family)
     words = replace(words, unlike=unlike_print(polar, words, growth, overhang, family))
-    good = _mean_odds(words, edges.weight) > _hopeful(family)
+    good = _mean_odds(words, edges.weight) > _least_odds(family)
     if not good.any():
         return unread
     drafts, words, growth = fit.select(good), words.select(good), growth[good]
@@ -258,7 +258,7 @@ def _by_dot(fit: Fit, printed: Fit, growth: np.ndarray, which: np.ndarray) -> Fi
     return fit.replaced(which, alone.select(which))
 
 
-def _hopeful(family: RingPrint) -> float:
+def _least_odds(family: RingPrint) -> float:
     """Return the mean log odds of a reading from which a band may show a word."""
     return HOPEFUL * min(1.0, least_marked(family) / FEW_MARKS)
 
