@@ -221,6 +221,11 @@ class Narrowing(Protocol):
         """All families, as its targets name them."""
         ...
 
+    @property
+    def groups(self) -> Sequence[Sequence[str]]:
+        """The families that are read together, for each group of them."""
+        ...
+
     def narrowed(self, families: Sequence[str]) -> Detector:
         """Return a detector of some of the families."""
         ...

@@ -45,12 +45,12 @@ _DIGITS = 2  # of a confidence, beyond which one is not surer than another
 class SeveralDetector:
     """Identify the targets of several detectors.
 
-    `of_parts` are the families of each, `narrow` is from some of all to their detector.
+    `groups` are the families of each, `narrow` is from some of all to their detector.
     """
 
     settings: DetectorSettings
     parts: tuple[Detector, ...]
-    of_parts: tuple[tuple[str, ...], ...]
+    groups: tuple[tuple[str, ...], ...]
     narrow: Callable[[Sequence[str]], Detector]
     name: ClassVar[str] = 'several'
 
@@ -62,7 +62,7 @@ class SeveralDetector:
     @property
     def families(self) -> tuple[str, ...]:
         """The families one by one."""
-        return tuple(name for families in self.of_parts for name in families)
+        return tuple(name for group in self.groups for name in group)
 
     @property
     def patience(self) -> int:
@@ -85,7 +85,7 @@ class SeveralDetector:
     def refine(self, image: np.ndarray, targets: Sequence[Target]) -> list[Target]:
         """Return targets with the centres that the detectors of their families find."""
         found = list(targets)
-        for part, families in zip(self.parts, self.of_parts, strict=True):
+        for part, families in zip(self.parts, self.groups, strict=True):
             which = [index for index, it in enumerate(found) if it.family in families]
             if which and isinstance(part, Refiner):
                 moved = part.refine(image, [found[index] for index in which])
@@ -154,7 +154,7 @@ class SeveralDetector:
         named = [
             (number, target)
             for number, found in enumerate(results)
-            for target in self._named(self.of_parts[number], found)
+            for target in self._named(self.groups[number], found)
         ]
         radii = [_radius(target, self.settings.prints) for _, target in named]
         order = sorted(

@@ -105,6 +105,7 @@ def create_identifier(
             settings,
             interrupt,
             kinds={it: settings.detection.prints[it].kind for it in used.families},
+            groups=used.groups,
             narrowed=narrowed,
         )
     return _identifier(Identifier, used, settings, interrupt)

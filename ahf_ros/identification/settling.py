@@ -2,10 +2,10 @@
 
 All families are looked for in the first images, as received, until it is clear which are there:
 mostly in one. From then on only those that were found are looked for, and all again in an image
-that does not clearly show one of these. Each image that does has a part of it looked at for all
-others, where its targets are painted over; what is there shows itself within some images, and
-none of them takes much longer. Where nothing has changed since all parts were looked at, as
-following the targets shows, such looks become rare.
+that does not clearly show one of these. Each image that does has a part of it looked at by the
+detector of some others, where its targets are painted over; what is there shows itself within some
+tens of images, and none of them takes much longer. Where nothing has changed since all detectors
+looked at all parts, as following the targets shows, such looks become rare.
 """
 
 import math
@@ -41,12 +41,12 @@ _WORTH_A_LOOK = 1.3  # ... on another family in a part of an image: one certain 
 _PER_IMAGE = 0.3  # words that texture shows by chance in an image, at the most
 _OF_KNOWN = 1.99  # ... on families that other images have settled: one certain to 0.99
 
-_IN_TURN = 8  # images, at least, over which the looks at all parts of one are spread
+_IN_TURN = 8  # images, at least, over which the looks of all detectors at all parts are spread
 _STILL = 30  # times as many, where nothing has changed since all these looks
-_WHOLE_KINDS = ('ring',), ('aruco', 'apriltag')  # of which a part may show too few
+_TOLD_BY_SEVERAL = {'ring', 'aruco', 'apriltag'}  # kinds of which a part may show too few
 _READ_BY_NAME = {'aruco', 'apriltag'}  # also where all families have been looked for
 _PART = 480  # side of a part of an image in which other families are looked for, px, at least
-_PARTS = 4  # of an image in a row and in a column, at the most; neighbours share a third
+_PARTS = 3  # of an image in a row and in a column, at the most; neighbours share a third
 
 
 def memory_of(families: Sequence[str]) -> Memory:
@@ -124,9 +124,12 @@ def _parts(shape: tuple[int, int]) -> list[Part]:
 
 
 def _reduced(image: np.ndarray, part: Part) -> np.ndarray:
-    """Return an image in the size of one of its parts."""
+    """Return an image in half the size of one of its parts.
+
+    It shows targets that are wider than what parts share, a third of a part.
+    """
     height, width = image.shape
-    scale = min((part[2] - part[0]) / width, (part[3] - part[1]) / height)
+    scale = min((part[2] - part[0]) / width, (part[3] - part[1]) / height) / 2
     return cv2.resize(image, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
 
 
@@ -172,6 +175,8 @@ class SettlingIdentifier(Identifier):
         As for `Identifier`, with a detector of all families.
     kinds : mapping of str to str
         The names of the families, and the kind of each.
+    groups : sequence of sequence of str
+        The families that one detector reads, for each detector.
     narrowed : callable
         From some of them to an identifier that has their detector.
     """
@@ -182,6 +187,7 @@ class SettlingIdentifier(Identifier):
         *arguments: Any,
         draft: DetectorFunction | None = None,
         kinds: Mapping[str, str],
+        groups: Sequence[Sequence[str]],
         narrowed: Callable[[tuple[str, ...]], Identifier],
         **options: Any,
     ) -> None:
@@ -190,6 +196,7 @@ class SettlingIdentifier(Identifier):
             lambda image: marked(detector(image)), *arguments, draft=drafted, **options
         )
         self._kinds = kinds
+        self._groups = [tuple(it) for it in groups]
         self._narrowed = narrowed
         self._made: dict[tuple[str, ...], Identifier] = {}
         self._looked: Trials | None = None
@@ -235,42 +242,50 @@ class SettlingIdentifier(Identifier):
     def _glance(self, stack: ImageStack, found: Identification) -> list[Target]:
         """Return what an image shows beside its targets, if a look at a part shows something.
 
-        Each image gets another look, those of a batch one at the whole; where there are few looks,
-        as at small images, some images get none, and where nothing has changed, most.
+        Each image gets another look, by one detector at one part, those of a batch one by all at
+        the whole; where there are few looks, as at small images, some images get none, and where
+        nothing has changed, most.
         """
         turn, still = self.memory.glanced, self.memory.seen.still if self.memory.seen else 0
         self.memory = replace(self.memory, glanced=turn + 1)
-        parts = _parts(stack.shape) if turn >= 0 else []
 
         def left(part: Part | None = None) -> np.ndarray:
             image = stack.combined(found.combination or stack.names[0])
             known = [it for it in found.targets if it.id != UNDECODED]
             return without_targets(image, known, found.prints, part)
 
-        def in_part(part: Part | None = None) -> list[Target]:
-            return self._seen(left(part))
-
-        def of_kinds(kinds: Collection[str]) -> list[Target]:
-            return self._of_kinds(kinds, left())
-
-        def reduced() -> list[Target]:
-            return self._seen(_reduced(left(), parts[0]))
-
-        looks: list[Callable[[], list[Target]]] = [in_part]
+        if turn < 0:
+            return self._others(self._seen(left()))
+        parts = _parts(stack.shape)
+        views: list[Callable[[], np.ndarray]] = [partial(left, it) for it in parts]
+        if len(parts) > 1:
+            views.append(lambda: _reduced(left(), parts[0]))
+        looks = [(view, group) for view in views for group in self._groups]
         if len(parts) > 1:  # where few may not tell which of several families it is
-            looks = [partial(in_part, it) for it in parts]
-            looks += [reduced, *(partial(of_kinds, it) for it in _WHOLE_KINDS)]
+            looks += [(left, of) for of in self._groups if self._kinds[of[0]] in _TOLD_BY_SEVERAL]
         every = math.ceil(_IN_TURN / len(looks)) if turn > 0 else 1
         if still >= every * len(looks):
             every *= _STILL
         if turn % every:
             return []
-        seen = looks[turn // every % len(looks)]()
-        if len(looks) > 1:
-            odds = evidence(map(reading_of, seen))
-            kinds = {self._kinds[name] for name, of in odds.items() if sum(of) > _WORTH_A_LOOK}
-            seen = of_kinds(kinds) if kinds else []
+        view, group = looks[turn // every % len(looks)]
+        shown = view()
+        if not self._worth_a_look(self._of(group, shown)):
+            return []
+        seen = self._seen(shown)
+        if len(parts) > 1:
+            seen = self._of(self._worth_a_look(seen), left())
+        return self._others(seen)
+
+    def _others(self, seen: Iterable[Target]) -> list[Target]:
+        """Return what was seen of families that no image has settled."""
         return [it for it in seen if reading_of(it)[0] not in (*self.memory.families, '')]
+
+    def _worth_a_look(self, seen: Iterable[Target]) -> list[str]:
+        """Return the families of all groups of which something was seen."""
+        odds = evidence(map(reading_of, seen))
+        likely = {name for name, of in odds.items() if sum(of) > _WORTH_A_LOOK}
+        return [name for group in self._groups if likely & {*group} for name in group]
 
     def _seen(self, image: np.ndarray) -> list[Target]:
         """Return what an image shows of all families."""
@@ -278,10 +293,11 @@ class SettlingIdentifier(Identifier):
             return []
         return list(checked_targets(self._detector(image), self._name))
 
-    def _of_kinds(self, kinds: Collection[str], image: np.ndarray) -> list[Target]:
-        """Return what an image shows of the families of some kinds."""
-        names = tuple(name for name, kind in self._kinds.items() if kind in kinds)
-        return marked(self._reader(names).seen(ImageStack((image,)))) if names else []
+    def _of(self, families: Sequence[str], image: np.ndarray) -> list[Target]:
+        """Return what an image shows of some families."""
+        if not families or image.min() == image.max():
+            return []
+        return marked(self._reader(tuple(families)).seen(ImageStack((image,))))
 
     def _trials(self, stack: ImageStack) -> Trials:
         """Return what is known of an image or stack that was looked at."""

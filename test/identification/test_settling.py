@@ -168,7 +168,7 @@ def test_what_stands_still_is_rarely_looked_at_again_until_it_changes() -> None:
     alone = np.hstack([render(replace(half, targets=number)).image for number in (4, 0)])
     other = render(replace(half, family='gsi', dot_radius=5, seed=5))
     both = np.hstack([alone[:, :450], other.image])
-    noise = np.random.default_rng(1).normal(0.0, 1.5, (30, *alone.shape))
+    noise = np.random.default_rng(1).normal(0.0, 1.5, (36, *alone.shape))
     identifier = create_identifier(threads=1)
     named = create_identifier(family='metashape12', threads=1)
 
@@ -178,10 +178,10 @@ def test_what_stands_still_is_rarely_looked_at_again_until_it_changes() -> None:
 
     still = [calls(np.clip(np.rint(alone + it), 0, 255).astype(np.uint8)) for it in noise]
     assert sum(of > 1.5 for of in still) > 5
-    assert max(still[-12:]) < 1.2
+    assert sum(of > 1.2 for of in still[-12:]) <= 1
     assert identifier.memory.families == ('metashape12',)
     since = identifier.memory.glanced
-    while 'gsi' not in identifier.memory.families and identifier.memory.glanced < since + 15:
+    while 'gsi' not in identifier.memory.families and identifier.memory.glanced < since + 25:
         identifier.identify(both)
     assert identifier.memory.families == ('metashape12', 'gsi')
 
@@ -193,9 +193,9 @@ def test_small_images_are_looked_at_now_and_then() -> None:
     for each in (identifier, named, identifier):
         each.identify(image)
     usual = calls_of(lambda: named.identify(image))
-    calls = [calls_of(lambda: identifier.identify(image)) for _ in range(8)]
-    assert sum(of > 1.5 * usual for of in calls) == 1
-    assert sum(of < 1.1 * usual for of in calls) == 7
+    calls = [calls_of(lambda: identifier.identify(image)) / usual for _ in range(10)]
+    assert max(calls[::2]) < 1.1
+    assert 1.1 < min(calls[1::2]) and max(calls[1::2]) < 1.7  # by one detector after the other
 
 
 @needs_square_markers
