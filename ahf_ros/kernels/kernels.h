@@ -31,6 +31,9 @@ void circle_values(count h, count w, count k, count r, count m, const float imag
                    const double frames[k][3][3], const double directions[2][m],
                    const double radii[k][r], const float lift[k], float values[k][r][m],
                    double reach[k][m]);
+void short_values(count h, count w, count k, count r, count m, const int16_t image[h][w],
+                  const double frames[k][3][3], const double directions[2][m],
+                  const double radii[k][r], double unit, double values[k][m][r], bool inside[k]);
 void second_differences(count h, count w, count k, count m, const float image[h][w],
                         const double frames[k][3][3], const double points[2][m], double medians[k],
                         double scratch[m]);

@@ -39,6 +39,30 @@ void circle_values(count h, count w, count k, count r, count m, const float imag
     }
 }
 
+/* The same of an image of whole numbers, in units of its own, and whether it shows all of them. */
+void short_values(count h, count w, count k, count r, count m, const int16_t image[h][w],
+                  const double frames[k][3][3], const double directions[2][m],
+                  const double radii[k][r], double unit, double values[k][m][r], bool inside[k])
+{
+    places at;
+    float along[3][POINTS], centre[3], seen[POINTS];
+    for (count b = 0; b < k; b++) {
+        inside[b] = true;
+        for (count start = 0; start < m; start += POINTS) {
+            count n = m - start < POINTS ? m - start : POINTS;
+            project(n, frames[b], &directions[0][start], &directions[1][start], along, centre);
+            for (count j = 0; j < r; j++) {
+                place(h, w, n, along, centre, (float)radii[b][j], &at);
+                shorts_of(h, w, image, &at, n, seen);
+                for (count a = 0; a < n; a++) {
+                    values[b][start + a][j] = seen[a] / unit;
+                    inside[b] &= at.outside[a] == 0;
+                }
+            }
+        }
+    }
+}
+
 /* The median size, at m points of targets, of the second difference of rows of the second difference
    of columns; 0 in images that have none. */
 void second_differences(count h, count w, count k, count m, const float image[h][w],

@@ -9,22 +9,21 @@ from __future__ import annotations
 
 import numpy as np
 
-from ahf_ros.vision.frame import circle_points, determinants, ellipse_axes, project
+from ahf_ros import kernels
+from ahf_ros.vision.frame import determinants, ellipse_axes
 from ahf_ros.vision.log_edges import LOG_SCALE
-from ahf_ros.vision.sampling import sample, within
 
 PIXELS_ASIDE = 1.0
 """Distance of samples from a circle in a sharp image, px of the minor axis."""
 
-_RAYS = 16
-_ANGLES = 2 * np.pi * np.arange(_RAYS) / _RAYS
+_ANGLES = 2 * np.pi * np.arange(16) / 16
+_RAYS = np.array([np.cos(_ANGLES), np.sin(_ANGLES)])
 _ASIDE = (0.3, 0.7)  # bounds of the distance of samples from the circle, dot radii
 _DOT_SPREAD = (0.3, 0.6)  # standard deviation of steps below and above the usual one, in it
 _EMPTY_SPREAD = 0.22  # the same of steps where there is no dot
 _FLOOR = 0.12  # share of rays that edges of light disturb
 _RANGE = 3.0  # of such steps
 _CORRELATION = 2.5  # distance on the circle at which rays are independent, px
-_PART = 12_500  # circles at a time, which bounds the memory
 
 
 def circle_sides(
@@ -36,15 +35,9 @@ def circle_sides(
     number or of shape (n,). With the values, float64 of shape (n, m, 2), comes whether all of a
     circle lies in the image, shape (n,).
     """
-    aside = np.broadcast_to(aside, len(frames))
-    sides, inside = np.empty((len(frames), _RAYS, 2)), np.empty(len(frames), bool)
-    for start in range(0, len(frames), _PART):
-        part = slice(start, start + _PART)
-        apart = np.clip(aside[part] / ellipse_axes(frames[part])[1], *_ASIDE)
-        radii = np.stack([1 - apart, 1 + apart], axis=1)
-        pixels = project(frames[part], circle_points(_ANGLES, radii))
-        sides[part] = sample(log, pixels).astype(np.float64) / LOG_SCALE
-        inside[part] = within(pixels, log.shape).all(axis=(1, 2))
+    apart = np.clip(np.divide(aside, ellipse_axes(frames)[1]), *_ASIDE)
+    radii = np.stack([1 - apart, 1 + apart], axis=1)
+    sides, inside = kernels.short_values(log, frames, _RAYS, radii, LOG_SCALE)
     return sides, inside
 
 
@@ -70,4 +63,4 @@ def dot_evidence(
 def independent_rays(frames: np.ndarray) -> np.ndarray:
     """Return the share of rays round dots with frames (..., 3, 3) that count as independent."""
     length = 2 * np.pi * np.sqrt(np.abs(determinants(frames)))
-    return np.clip(length / _CORRELATION, 4, _RAYS) / _RAYS
+    return np.clip(length / _CORRELATION, 4, len(_ANGLES)) / len(_ANGLES)

@@ -18,7 +18,7 @@ from ahf_ros.vision.log_edges import LogEdges
 NEIGHBOURS = 5
 """Dots nearest to a place that tell its shape."""
 
-_BLOCKS = 64  # of places with the same shape, along the longer side of an image
+_BLOCKS = 32  # of places with the same shape, along the longer side of an image
 _SHARE = 0.2  # of the outline of a dot, in edge pixels that vote for its centre
 _REACH = 0.5  # within which no other centre has more votes, in radii of the smallest dot
 _CENTRE = 0.5  # of the first pixel, in cells

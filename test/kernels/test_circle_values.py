@@ -43,6 +43,29 @@ def test_circles_are_sampled_between_pixels(seed: int, shape: tuple[int, int]) -
             assert reach[b, a] == pytest.approx(shown)
 
 
+@pytest.mark.parametrize('shape', [(1, 1), (1, 9), (7, 1), (30, 40)])
+def test_images_of_whole_numbers_are_sampled_on_circles(shape: tuple[int, int]) -> None:
+    generator = np.random.default_rng(shape[1])
+    image = generator.integers(-100, 156, shape).astype(np.int16)
+    frames = np.tile(np.eye(3), (4, 1, 1)) + generator.normal(0, 0.003, (4, 3, 3))
+    frames[:, :2, :2] *= 4
+    frames[:, :2, 2] = generator.uniform(0, 30, (4, 2))
+    angles, radii = np.arange(70) / 70 * 2 * np.pi, generator.uniform(0, 2, (4, 3))
+    directions = np.array([np.cos(angles), np.sin(angles)])
+    values, inside = kernels.short_values(image, frames, directions, radii, 10.0)
+    for b in range(4):
+        whole = True
+        for a, j in np.ndindex(70, 3):
+            x, y, scale = frames[b] @ [*(radii[b, j] * directions[:, a]), 1]
+            value = at(image, x / scale, y / scale)
+            # Places are those of 32 in a pixel, values whole numbers.
+            assert 10 * values[b, a, j] == pytest.approx(value, abs=0.5 + 255 / 32)
+            whole &= 0 <= x / scale <= shape[1] - 1 and 0 <= y / scale <= shape[0] - 1
+        assert inside[b] == whole
+    if min(shape) > 20:
+        assert inside.any() and not inside.all()
+
+
 @pytest.mark.parametrize('shape', [(1, 2), (3, 3), (20, 30)])
 def test_noise_is_measured_by_second_differences(shape: tuple[int, int]) -> None:
     generator = np.random.default_rng(shape[0])
