@@ -22,7 +22,11 @@ import numpy as np
 from ahf_ros.kernels import HEADER, NUMBERS, Kernel, declared
 
 KERNELS = declared(HEADER.read_text(encoding='utf-8'))
-TYPES: dict[str, Any] = {'count': ctypes.c_int64, **{it: NUMBERS[it][1] for it in NUMBERS}}
+TYPES: dict[str, Any] = {
+    'count': ctypes.c_int64,
+    'rows': ctypes.c_int64,
+    **{it: NUMBERS[it][1] for it in NUMBERS},
+}
 
 PROGRAM = """\
 #include <stdio.h>
@@ -99,7 +103,7 @@ def repeated(command: Sequence[str], calls: Counter[str]) -> Iterator[None]:
 def _bytes(kernel: Kernel, values: Sequence[Any]) -> list[bytes]:
     """Return the bytes of each parameter of a call, and in the place of an array its bytes."""
     pairs = list(zip(kernel.parameters, values, strict=True))
-    counts = {each.name: value for each, value in pairs if each.kind == 'count'}
+    counts = {each.name: value for each, value in pairs if each.is_count}
     return [
         ctypes.string_at(
             value, prod(int(counts.get(side, side)) for side in each.sides) * each.dtype.itemsize

@@ -18,9 +18,6 @@ from typing import Any
 import cv2
 import numpy as np
 
-from ahf_ros.base.blas import one_blas_thread
-from ahf_ros.base.deprecation import deprecated_arguments
-from ahf_ros.base.notices import said_once
 from ahf_ros.base.target import UNDECODED, Identification, Target, UndecodedTarget
 from ahf_ros.base.target_check import checked_targets
 from ahf_ros.families.contract import Part
@@ -201,26 +198,20 @@ class SettlingIdentifier(Identifier):
         self._made: dict[tuple[str, ...], Identifier] = {}
         self._looked: Trials | None = None
 
-    @deprecated_arguments(positions=('expected_targets',))
-    @one_blas_thread()
-    @said_once()
-    def identify(
-        self, image: np.ndarray | ImageStack, *, expected_targets: int | None = None
-    ) -> Identification:
-        """Identify the targets of one image or stack; see `Identifier.identify`."""
+    def _of_stack(self, stack: ImageStack, expected: int | None) -> Identification:
+        """Identify the targets of a stack; see `Identifier.identify`."""
         started = self._clock()
-        stack = image if isinstance(image, ImageStack) else ImageStack((image,))
         known, found = self.memory.families, None
         if self.memory.shown >= FIRST:
-            found = self._read(stack, known, expected_targets)
+            found = self._read(stack, known, expected)
         settled = found is not None and still_shown(found.targets)
         seen = self._glance(stack, found) if found and settled else self._look(stack)
         families = self._ordered({*known, *_families(seen)})
         if not families:
-            found = super().identify(stack, expected_targets=expected_targets)
+            found = super()._of_stack(stack, expected)
             families = self._ordered(_families(found.targets))
         elif found is None or families != known:
-            found = self._read(stack, families, expected_targets)
+            found = self._read(stack, families, expected)
         if seen or not settled:
             unsettled = tuple(_beside(seen, found.targets, families))
             found = replace(found, looked_for=self._looked_for, unsettled=unsettled)

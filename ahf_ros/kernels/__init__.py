@@ -4,6 +4,8 @@
 takes its constant arrays and numbers and returns the others. Every shape is checked against the
 declaration before the call, so that no kernel reads or writes beyond an array.
 
+Rows that are independent of each other may be shared among threads, see `shared`.
+
 Examples
 --------
 >>> from ahf_ros import kernels
@@ -20,9 +22,15 @@ import ctypes
 import os
 import re
 import sys
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass
 from functools import cache, cached_property
+from itertools import pairwise
 from pathlib import Path
+from time import perf_counter
 from typing import Any
 
 import numpy as np
@@ -47,6 +55,14 @@ NUMBERS: dict[str, tuple[np.dtype[Any], Any]] = {
 }
 """The types of numbers in the header, in numpy and in ctypes."""
 
+_COUNTS = 'count', 'rows'
+
+WORTH = 5e-4
+"""Time of a call from which it is shared among threads, s: ten times what it takes to share it."""
+
+_THREADS: ContextVar[int] = ContextVar('threads', default=1)
+_TIMES: dict[str, float] = {}  # of a row, s, in the last call of each kernel that may be shared
+
 _COMMENT = re.compile(r'/\*.*?\*/', re.S)
 _DECLARATION = re.compile(r'\bvoid\s+(\w+)\(([^)]*)\);')
 _PARAMETER = re.compile(r'(const\s+)?(\w+)\s+(\w+)((?:\[\w+\])*)')
@@ -66,6 +82,11 @@ class Parameter:
         """How many sides an array has."""
         return len(self.sides)
 
+    @property
+    def is_count(self) -> bool:
+        """Whether it says how many there are of something."""
+        return self.kind in _COUNTS
+
     @cached_property
     def dtype(self) -> np.dtype[Any]:
         """What numpy calls the type."""
@@ -75,11 +96,11 @@ class Parameter:
     def parsed(text: str) -> Parameter:
         """Return the parameter that a declaration has."""
         parts = _PARAMETER.fullmatch(text.strip())
-        if not parts or parts[2] not in (*NUMBERS, 'count'):
+        if not parts or parts[2] not in (*NUMBERS, *_COUNTS):
             raise ValueError(f'the parameter is {text.strip()}, accepted is TYPE name[count]')
         constant, kind, name, shape = parts.groups()
         sides = tuple(re.findall(r'\w+', shape))
-        return Parameter(name, kind, bool(constant) or (not sides and kind != 'count'), sides)
+        return Parameter(name, kind, bool(constant) or (not sides and kind not in _COUNTS), sides)
 
 
 @dataclass(frozen=True)
@@ -116,7 +137,7 @@ class Kernel:
         function.restype = None
         function.argtypes = [
             ctypes.c_ssize_t
-            if each.kind == 'count'
+            if each.is_count
             else ctypes.c_void_p
             if each.sides
             else NUMBERS[each.kind][1]
@@ -128,7 +149,7 @@ class Kernel:
     def _plan(self) -> tuple[list[Parameter], list[Parameter], dict[str, int]]:
         """The arguments; the results; and the sizes that shapes state as numbers."""
         given = [each for each in self.parameters if each.given]
-        results = [each for each in self.parameters if not each.given and each.kind != 'count']
+        results = [each for each in self.parameters if not (each.given or each.is_count)]
         numbers = {
             side: int(side) for each in self.parameters for side in each.sides if side.isdigit()
         }
@@ -167,17 +188,70 @@ class Kernel:
                 taken[each.name].fill(0)
         else:
             taken |= sizes
-            self._function(
-                *[
-                    taken[each.name].__array_interface__['data'][0]
-                    if each.sides
-                    else taken[each.name]
-                    for each in self.parameters
-                ]
-            )
+            threads = _THREADS.get() if self._rows else 1
+            if threads > 1:
+                self._timed(taken, min(threads, sizes[self._rows]))
+            else:
+                self._run(taken)
         if len(results) == 1:
             return taken[results[0].name]
         return tuple([taken[each.name] for each in results])
+
+    @cached_property
+    def _rows(self) -> str:
+        """The count of what is independent of each other; empty if nothing is."""
+        return next((each.name for each in self.parameters if each.kind == 'rows'), '')
+
+    def _run(self, taken: dict[str, Any]) -> None:
+        """Call the compiled function."""
+        self._function(
+            *[
+                taken[each.name].__array_interface__['data'][0] if each.sides else taken[each.name]
+                for each in self.parameters
+            ]
+        )
+
+    def _timed(self, taken: dict[str, Any], threads: int) -> None:
+        """Call it, by threads where its rows took long enough the last time."""
+        rows, started = taken[self._rows], perf_counter()
+        parts = threads if rows * _TIMES.get(self.name, 0.0) > WORTH else 1
+        if parts > 1:
+            self._shared(taken, parts)
+        else:
+            self._run(taken)
+        _TIMES[self.name] = parts * (perf_counter() - started) / rows
+
+    def _shared(self, taken: dict[str, Any], parts: int) -> None:
+        """Call it for parts of the rows at the same time."""
+        bounds = [taken[self._rows] * number // parts for number in range(parts + 1)]
+        pieces = [self._piece(taken, *of) for of in pairwise(bounds)]
+        others = [_pool().submit(self._run, of) for of in pieces[1:]]
+        self._run(pieces[0])
+        for other in others:
+            other.result()
+        for each in self._plan[1]:
+            if self._rows in each.sides[1:]:
+                axis = each.sides.index(self._rows)
+                taken[each.name] = np.concatenate([of[each.name] for of in pieces], axis=axis)
+
+    def _piece(self, taken: dict[str, Any], start: int, stop: int) -> dict[str, Any]:
+        """Return the values of some rows; what is no part of all has room of its own."""
+        piece = taken | {self._rows: stop - start}
+        for each in self.parameters:
+            if not each.sides or (each.given and self._rows not in each.sides):
+                continue
+            value = taken[each.name]
+            some = [
+                slice(start, stop) if side == self._rows else slice(None) for side in each.sides
+            ]
+            part = value[tuple(some)]
+            whole = each.sides[0] == self._rows  # rows follow each other
+            if each.given:
+                part = np.ascontiguousarray(part)
+            elif not whole:
+                part = np.empty(part.shape, each.dtype)
+            piece[each.name] = part
+        return piece
 
     def _refusal(self, each: Parameter, value: np.ndarray, sizes: dict[str, int]) -> ValueError:
         known = ', '.join(f'{it} = {sizes[it]}' for it in dict.fromkeys(each.sides) if it in sizes)
@@ -209,6 +283,28 @@ def declared(header: str) -> dict[str, Kernel]:
 @cache
 def _kernels() -> dict[str, Kernel]:
     return declared(HEADER.read_text(encoding='utf-8'))
+
+
+@contextmanager
+def shared(threads: int) -> Iterator[None]:
+    """Share the rows of long calls among threads; the results are the same, bit for bit.
+
+    It holds for the calls of the thread that enters it.
+    """
+    before = _THREADS.set(threads)
+    try:
+        yield
+    finally:
+        _THREADS.reset(before)
+
+
+@cache
+def _pool() -> ThreadPoolExecutor:
+    return ThreadPoolExecutor(thread_name_prefix=__name__)
+
+
+if hasattr(os, 'register_at_fork'):  # a process has no threads of the one that it was forked from
+    os.register_at_fork(after_in_child=_pool.cache_clear)
 
 
 @cache

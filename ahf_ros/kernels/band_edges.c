@@ -273,7 +273,7 @@ static void covered_ground(count m, count n, look of, float shade, float light_e
    and [1] at the outer one, of k targets that are each in one of i images of c circles; what paper
    and ink give on average; and where something covers the ground. `lit` is the probability of an
    edge of light between neighbours. */
-void edge_evidence(count k, count i, count c, count m, count n, const float gray[i][c][m],
+void edge_evidence(rows k, count i, count c, count m, count n, const float gray[i][c][m],
                    const int64_t row[k], const double reach[k][m], const double plate[k][m],
                    const double looks_of[k][8], const double edges[k][3], const float weight[k],
                    const float shares[n], const double deciding[24], float looks[k][2][n][m],
@@ -300,7 +300,7 @@ void edge_evidence(count k, count i, count c, count m, count n, const float gray
 }
 
 /* The same of paper and of ink at s places of edges, both edges together. */
-void shifted_evidence(count k, count i, count c, count m, count s, const float gray[i][c][m],
+void shifted_evidence(rows k, count i, count c, count m, count s, const float gray[i][c][m],
                       const int64_t row[k], const double reach[k][m], const double plate[k][m],
                       const double looks_of[k][8], const double edges[k][s][3],
                       const float weight[k], const double deciding[24], float looks[k][s][2][m],

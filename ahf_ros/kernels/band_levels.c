@@ -85,7 +85,7 @@ static float behind_a_plate(count d, count m, const bool near[d], const numbers 
    one, from gray values on d circles and those that paper has there, with the deviation of their
    ln; of dots as ink over light on paper; how likely light is that nothing predicts; and where
    something covers the ground. */
-void level_evidence(count k, count d, count m, count n, const float levels[k][d][m],
+void level_evidence(rows k, count d, count m, count n, const float levels[k][d][m],
                     const float light[k][d][m], const float spread[k][d][m], const double radii[d],
                     const double band[2], const double edges[k][2], const double reach[k][m],
                     const double looks_of[k][8], const float weight[k], const float shares[n],

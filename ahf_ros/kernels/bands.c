@@ -13,7 +13,7 @@ static const float NEVER = -1e30f;
    their weight, as light may do anything at any angle. For shares of ink between paper, the first,
    and ink, the last, they are the best ones within `reach` steps: the phase of sectors is known to
    no better. */
-void bounded_readings(count k, count h, count n, count m, const float values[k][h][n][m],
+void bounded_readings(rows k, count h, count n, count m, const float values[k][h][n][m],
                       const float most[k], const int64_t reach[k], float best[k][n][m],
                       float bounded[n][m])
 {
@@ -114,7 +114,7 @@ static inline void evidence_of(int64_t word, count n, float sums[PARTS][2 << BIT
 
 /* The words with the most evidence at any of four phases, more than others before they are read by
    a prior, and the best phase of each: c of them, the best first, again where there are fewer. */
-void competing_words(count k, count n, count w, count c, const double ones[k][4][n],
+void competing_words(rows k, count n, count w, count c, const double ones[k][4][n],
                      const double pairs[k][4][n], const int64_t words[w], const float prior[w],
                      int64_t best[k][c], int64_t phases[k][c], float highest[c])
 {
@@ -159,7 +159,7 @@ void competing_words(count k, count n, count w, count c, const double ones[k][4]
 /* Shares of ink that w words show at each angle, in so many steps from paper to ink, by the angle
    at which their lowest bit begins. Each of n sectors has p angles; for the spread of their ends
    see `sector_evidence`. */
-void word_steps(count k, count w, count p, count n, count m, const int64_t words[k][w],
+void word_steps(rows k, count w, count p, count n, count m, const int64_t words[k][w],
                 const int64_t phases[k][w], const float rising[k][2][p], const float falling[k][2][p],
                 int64_t last, uint8_t steps[k][w][m])
 {
@@ -194,7 +194,7 @@ static inline count angle_after(int64_t first, count i, count m)
 /* Evidence for words with their best covers, from that for what they show. A cover has its `price`
    and a `cost` at each angle; one that looks like paper has its own price, and its evidence at each
    angle, on paper and on marks. */
-void covered_words(count k, count w, count n, count m, const float looks[k][n][m],
+void covered_words(rows k, count w, count n, count m, const float looks[k][n][m],
                    const uint8_t steps[k][w][m], const int64_t first[k],
                    const float on_paper[k][m], const float on_mark[k][m], float price,
                    const float cost[k], const float paper_price[k], float scores[k][w])
@@ -309,7 +309,7 @@ void free_arcs(count k, count n, count m, const float looks[k][n][m], const int6
 
 /* Which of v moves of a word along the band has the most evidence, the first of them if several
    do. Each shows the mean step of two angles of the word at each angle. */
-void best_moves(count k, count n, count m, count v, const float looks[k][n][m],
+void best_moves(rows k, count n, count m, count v, const float looks[k][n][m],
                 const uint8_t steps[k][m], const int64_t here[v][m], const int64_t before[v][m],
                 int64_t best[k])
 {

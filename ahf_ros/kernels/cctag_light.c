@@ -93,7 +93,7 @@ static void solve_planes(count m, count n, count size, const float weight[m][n],
     solve(size, 1, normal, (double(*)[1])found);
 }
 
-void cctag_edges(count k, count m, count n, const float values[k][m][n],
+void cctag_edges(rows k, count m, count n, const float values[k][m][n],
                  const float weight[k][m][n], const float slope[k][n], const double width[k],
                  const double area[k], const double start[k][3][5], int16_t number,
                  const float places[2][m][n], const float around[4][m][n], int16_t rounds,

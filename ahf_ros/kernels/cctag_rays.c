@@ -66,7 +66,7 @@ static void mixed_along(count h, count w, count n, const double frame[3][3], dou
     }
 }
 
-void cctag_lit(count h, count w, count k, count m, count n, count s, const float gray[h][w],
+void cctag_lit(count h, count w, rows k, count m, count n, count s, const float gray[h][w],
                const double frames[k][3][3], const double directions[2][m], const double radii[n],
                const double lights[k][3][3], const double heights[k][5],
                const double edges[k][3][5], const double width[k],
@@ -278,7 +278,7 @@ static void weigh(count m, count n, const float along[n], const double contrast[
     }
 }
 
-void cctag_rays(count k, count m, count n, const float values[k][m][n],
+void cctag_rays(rows k, count m, count n, const float values[k][m][n],
                 const float highest[k][m][n], const float mixed[k][m][n], const int32_t apart[k],
                 const float ink[k][n], const float by_radius[k][n], const float by_shift[k][n],
                 const float by_blur[k][n], const float by_sharpening[k][n], const float along[n],

@@ -29,7 +29,7 @@ static void add_circles(count c, count n, const double circles[c], double size, 
     }
 }
 
-void cctag_rings(count k, count c, count n, const double circles[k][c], const double size[k],
+void cctag_rings(rows k, count c, count n, const double circles[k][c], const double size[k],
                  const double shift[k], const double blur[k], const double sharpening[k],
                  const float along[n], double mask, float ink[k][n], float by_radius[k][n],
                  float by_shift[k][n], float by_blur[k][n], float by_sharpening[k][n],

@@ -19,7 +19,7 @@ static inline float float_dot(count n, const float a[n], const float b[n])
 
 /* What the error of each edge, and of the light's slope there, does to the centre: not its weight
    times the error, but the derivative of that. */
-void edge_parts(count k, count m, count n, count q, const double basis[m][n],
+void edge_parts(rows k, count m, count n, count q, const double basis[m][n],
                 const int16_t polarity[k][m], const double scale[k][m],
                 const double sensitivity[k][m], const double equations[k][q][q],
                 const double own[k][m], const double relative[k][m], const double weights[k][m],

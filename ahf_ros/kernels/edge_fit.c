@@ -5,7 +5,7 @@
 
 /* How much edges look like the usual one of their target: by the ratio of their levels, and by how
    much they are steps. */
-void edge_weights(count k, count m, const double dark[k][m], const double bright[k][m],
+void edge_weights(rows k, count m, const double dark[k][m], const double bright[k][m],
                   const double residual[k][m], const bool visible[k][m], double log_offset,
                   double normal, double minimum_contrast, double ratio_doubt,
                   double minimum_ratio_error, double residual_doubt, double minimum_residual,
@@ -39,7 +39,7 @@ void edge_weights(count k, count m, const double dark[k][m], const double bright
 
 /* Slopes of the light, 1/px, smoothed along lines of n points; their mean towards the bright side
    is not the light's. `totals` are the weights that each is made from. */
-void light_slopes(count k, count l, count n, const double slopes[k][l][n],
+void light_slopes(rows k, count l, count n, const double slopes[k][l][n],
                   const int16_t polarity[k][l][n], const double weights[k][l][n],
                   const float window[n][n], const double prior[k], double sharpened,
                   double minimum_usual, double outlier, int16_t rounds, double no_weight,
@@ -106,7 +106,7 @@ void light_slopes(count k, count l, count n, const double slopes[k][l][n],
 
 /* Unknowns that bring outlines onto edges, by least squares reweighted after Geman and McClure. The
    last one may be the growth of ink, px. Light moves edges where `uneven`, px, is not 0. */
-void outline_fits(count k, count m, count n, count q, const double offset[k][m],
+void outline_fits(rows k, count m, count n, count q, const double offset[k][m],
                   const double sensitivity[k][m], const double slope[k][m],
                   const double dark[k][m], const double bright[k][m], const double scale[k][m],
                   const int16_t polarity[k][m], const bool seen[k][m], const double own[k][m],

@@ -29,7 +29,7 @@ static inline float held(float step, const double counted[2])
     return greater_f(lesser_f(step, (float)counted[1]), (float)counted[0]);
 }
 
-void best_outlines(count h, count w, count k, count s, const int16_t log[h][w],
+void best_outlines(count h, count w, rows k, count s, const int16_t log[h][w],
                    const double points[k][2], const double scale[k], const double rays[2][24],
                    const double radii[22], const int32_t bins[s][24], const float beside[s][24],
                    const double least[s], const double counted[2], int32_t best[k][2],
@@ -111,7 +111,7 @@ static inline void find_edges(count h, count w, count m, const int16_t log[h][w]
     }
 }
 
-void moved_ellipses(count h, count w, count k, count m, const int16_t log[h][w],
+void moved_ellipses(count h, count w, rows k, count m, const int16_t log[h][w],
                     const double start[k][3][3], const double scale[k], const double rays[2][m],
                     const double basis[m][5], const double places[13], const double window[3],
                     const double counted[2], double flat, double least, double clear,
@@ -150,7 +150,7 @@ void moved_ellipses(count h, count w, count k, count m, const int16_t log[h][w],
     }
 }
 
-void gray_sizes(count h, count w, count k, const int16_t log[h][w], const double frames[k][3][3],
+void gray_sizes(count h, count w, rows k, const int16_t log[h][w], const double frames[k][3][3],
                 const double polarity[k], const double rays[2][16], const double places[13],
                 const double window[3], double unit, double flat, double sizes[k])
 {

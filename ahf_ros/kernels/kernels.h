@@ -13,6 +13,8 @@
 #include <stdint.h>
 
 typedef ptrdiff_t count;
+/* A count of what is independent of each other: threads may share it, with scratch of their own. */
+typedef count rows;
 
 /* The nearest index of an array of n. */
 static inline count within(int64_t i, count n) { return i < 0 ? 0 : i < n ? (count)i : n - 1; }
@@ -27,17 +29,17 @@ void logarithms_f(count n, const float x[n], float y[n]);
 
 /* polar.c */
 
-void circle_values(count h, count w, count k, count r, count m, const float image[h][w],
+void circle_values(count h, count w, rows k, count r, count m, const float image[h][w],
                    const double frames[k][3][3], const double directions[2][m],
                    const double radii[k][r], const float lift[k], float values[k][r][m],
                    double reach[k][m]);
-void short_values(count h, count w, count k, count r, count m, const int16_t image[h][w],
+void short_values(count h, count w, rows k, count r, count m, const int16_t image[h][w],
                   const double frames[k][3][3], const double directions[2][m],
                   const double radii[k][r], double unit, double values[k][m][r], bool inside[k]);
-void second_differences(count h, count w, count k, count m, const float image[h][w],
+void second_differences(count h, count w, rows k, count m, const float image[h][w],
                         const double frames[k][3][3], const double points[2][m], double medians[k],
                         double scratch[m]);
-void ground_votes(count k, count i, count c, count m, count s, const float gray[i][c][m],
+void ground_votes(rows k, count i, count c, count m, count s, const float gray[i][c][m],
                   const int64_t row[k], const float white[k][m], const double radii[k][c],
                   const double least[k], const int64_t beyond[s][m], int64_t votes[k][s],
                   int64_t outermost[k], int32_t sums[c][m]);
@@ -47,13 +49,13 @@ void ground_votes(count k, count i, count c, count m, count s, const float gray[
 void gray_at(count k, count i, count c, count m, count r, const float gray[i][c][m],
              const int64_t row[k], double innermost, const double outermost[k],
              const double radii[k][r], float values[k][r][m]);
-void edge_evidence(count k, count i, count c, count m, count n, const float gray[i][c][m],
+void edge_evidence(rows k, count i, count c, count m, count n, const float gray[i][c][m],
                    const int64_t row[k], const double reach[k][m], const double plate[k][m],
                    const double looks_of[k][8], const double edges[k][3], const float weight[k],
                    const float shares[n], const double deciding[24], float looks[k][2][n][m],
                    float typical[k][2][2][m], bool covered[k][2][m], float lit[k],
                    float read[2][7][m], float steps[7][m]);
-void shifted_evidence(count k, count i, count c, count m, count s, const float gray[i][c][m],
+void shifted_evidence(rows k, count i, count c, count m, count s, const float gray[i][c][m],
                       const int64_t row[k], const double reach[k][m], const double plate[k][m],
                       const double looks_of[k][8], const double edges[k][s][3],
                       const float weight[k], const double deciding[24], float looks[k][s][2][m],
@@ -61,7 +63,7 @@ void shifted_evidence(count k, count i, count c, count m, count s, const float g
 
 /* band_levels.c */
 
-void level_evidence(count k, count d, count m, count n, const float levels[k][d][m],
+void level_evidence(rows k, count d, count m, count n, const float levels[k][d][m],
                     const float light[k][d][m], const float spread[k][d][m], const double radii[d],
                     const double band[2], const double edges[k][2], const double reach[k][m],
                     const double looks_of[k][8], const float weight[k], const float shares[n],
@@ -82,7 +84,7 @@ void unlike_shares(count k, count i, count c, count m, count n, const float gray
 
 /* bands.c */
 
-void bounded_readings(count k, count h, count n, count m, const float values[k][h][n][m],
+void bounded_readings(rows k, count h, count n, count m, const float values[k][h][n][m],
                       const float most[k], const int64_t reach[k], float best[k][n][m],
                       float bounded[n][m]);
 void sector_evidence(count k, count m, count p, count n, const float inked[k][m],
@@ -90,13 +92,13 @@ void sector_evidence(count k, count m, count p, count n, const float inked[k][m]
                      double pairs[k][p][n]);
 void likeliest_bits(count k, count n, const double ones[k][n], const double pairs[k][n],
                     bool bits[k][n], double highest[k], bool before[k][2][n][2]);
-void competing_words(count k, count n, count w, count c, const double ones[k][4][n],
+void competing_words(rows k, count n, count w, count c, const double ones[k][4][n],
                      const double pairs[k][4][n], const int64_t words[w], const float prior[w],
                      int64_t best[k][c], int64_t phases[k][c], float highest[c]);
-void word_steps(count k, count w, count p, count n, count m, const int64_t words[k][w],
+void word_steps(rows k, count w, count p, count n, count m, const int64_t words[k][w],
                 const int64_t phases[k][w], const float rising[k][2][p], const float falling[k][2][p],
                 int64_t last, uint8_t steps[k][w][m]);
-void covered_words(count k, count w, count n, count m, const float looks[k][n][m],
+void covered_words(rows k, count w, count n, count m, const float looks[k][n][m],
                    const uint8_t steps[k][w][m], const int64_t first[k],
                    const float on_paper[k][m], const float on_mark[k][m], float price,
                    const float cost[k], const float paper_price[k], float scores[k][w]);
@@ -107,7 +109,7 @@ void hidden_angles(count k, count n, count m, const float looks[k][n][m],
 void free_arcs(count k, count n, count m, const float looks[k][n][m], const int64_t first[k],
                const float border[k], float price, const float cost[k], float scores[k],
                int64_t borders[k]);
-void best_moves(count k, count n, count m, count v, const float looks[k][n][m],
+void best_moves(rows k, count n, count m, count v, const float looks[k][n][m],
                 const uint8_t steps[k][m], const int64_t here[v][m], const int64_t before[v][m],
                 int64_t best[k]);
 void predicted_angles(count k, count m, const float best[k][m], const float further[k], float price,
@@ -124,7 +126,7 @@ void cctag_light(count k, count m, count n, const float places[2][m][n],
 
 /* Edges of light that some settle at, or that are known if there are no rounds, and the heights of
    slopes, moves of frames and edges. */
-void cctag_edges(count k, count m, count n, const float values[k][m][n],
+void cctag_edges(rows k, count m, count n, const float values[k][m][n],
                  const float weight[k][m][n], const float slope[k][n], const double width[k],
                  const double area[k], const double start[k][3][5], int16_t number,
                  const float places[2][m][n], const float around[4][m][n], int16_t rounds,
@@ -161,14 +163,14 @@ void cctag_fit(count h, count w, count n, count c, count q, count rounds,
 
 void selected_medians(count k, count m, const double values[k][m], const bool selected[k][m],
                       double empty, double medians[k], double scratch[m]);
-void linear_fits(count k, count m, count n, const double values[k][m], const double weights[k][m],
+void linear_fits(rows k, count m, count n, const double values[k][m], const double weights[k][m],
                  const double basis[m][n], const double prior[n], double scale, int16_t rounds,
                  double unknowns[k][n], double residuals[k][m], double robust[m],
                  double normal[n][n], double products[m][n][n]);
 
 /* profiles.c */
 
-void edge_points(count k, count m, const double frames[k][3][3], const double points[m][2],
+void edge_points(rows k, count m, const double frames[k][3][3], const double points[m][2],
                  const double normals[m][2], const double curvature[m], const double spacing[m],
                  double no_length, double images[k][m][2], double outwards[k][m][2],
                  double scale[k][m], double distance[k][m], double bend[k][m]);
@@ -177,7 +179,7 @@ void profile_groups(count k, count m, count w, const double points[k][m][2],
                     const double scale[k][m], const double reach[k], const double enough[k],
                     const int32_t blurs[k], const double half_widths[w], double right,
                     double bottom, int32_t groups[k][m]);
-void fit_steps(count h, count w, count k, count m, count g, count f, const float gray[h][w],
+void fit_steps(count h, count w, rows k, count m, count g, count f, const float gray[h][w],
                const double points[k][m][2], const double normals[k][m][2],
                const int16_t polarity[k][m], const double spacing[k][m],
                const double curvature[k][m], const double blur[k], const int32_t groups[k][m],
@@ -190,20 +192,20 @@ void fit_steps(count h, count w, count k, count m, count g, count f, const float
 
 /* edge_fit.c */
 
-void edge_weights(count k, count m, const double dark[k][m], const double bright[k][m],
+void edge_weights(rows k, count m, const double dark[k][m], const double bright[k][m],
                   const double residual[k][m], const bool visible[k][m], double log_offset,
                   double normal, double minimum_contrast, double ratio_doubt,
                   double minimum_ratio_error, double residual_doubt, double minimum_residual,
                   double minimum_bright, bool seen[k][m], double weights[k][m],
                   double contrast[k], double scratch[2][m]);
-void light_slopes(count k, count l, count n, const double slopes[k][l][n],
+void light_slopes(rows k, count l, count n, const double slopes[k][l][n],
                   const int16_t polarity[k][l][n], const double weights[k][l][n],
                   const float window[n][n], const double prior[k], double sharpened,
                   double minimum_usual, double outlier, int16_t rounds, double no_weight,
                   double errors[k][l][n], double smooth[k][l][n], double used[k][l][n],
                   double totals[k][l][n], float sums[2][n], bool seen[n], double scratch[2][n],
                   int32_t spans[n][2]);
-void outline_fits(count k, count m, count n, count q, const double offset[k][m],
+void outline_fits(rows k, count m, count n, count q, const double offset[k][m],
                   const double sensitivity[k][m], const double slope[k][m],
                   const double dark[k][m], const double bright[k][m], const double scale[k][m],
                   const int16_t polarity[k][m], const bool seen[k][m], const double own[k][m],
@@ -215,7 +217,7 @@ void outline_fits(count k, count m, count n, count q, const double offset[k][m],
 
 /* edge_errors.c */
 
-void edge_parts(count k, count m, count n, count q, const double basis[m][n],
+void edge_parts(rows k, count m, count n, count q, const double basis[m][n],
                 const int16_t polarity[k][m], const double scale[k][m],
                 const double sensitivity[k][m], const double equations[k][q][q],
                 const double own[k][m], const double relative[k][m], const double weights[k][m],
@@ -249,7 +251,7 @@ void vote_peaks(count rows, count wide, count most, const uint16_t votes[rows][w
    s radii, and over their mean. Where a share of them, `many`, is beyond the limits up to which none
    is clipped, `apart` is not 0: so many radii away is what interpolation mixes with each, by the share
    `mixed`, and nothing is brighter than `highest`. */
-void cctag_lit(count h, count w, count k, count m, count n, count s, const float gray[h][w],
+void cctag_lit(count h, count w, rows k, count m, count n, count s, const float gray[h][w],
                const double frames[k][3][3], const double directions[2][m], const double radii[n],
                const double lights[k][3][3], const double heights[k][5],
                const double edges[k][3][5], const double width[k], const double blur[k],
@@ -261,7 +263,7 @@ void cctag_lit(count h, count w, count k, count m, count n, count s, const float
    error of `outlier` usual deviations leaves a quarter. Then the normal equations of changes of the
    frame and of edges, without what another paper and ink of a ray explain. The model is what a camera
    that does not clip sees, and the gain how what is seen changes by it. */
-void cctag_rays(count k, count m, count n, const float values[k][m][n],
+void cctag_rays(rows k, count m, count n, const float values[k][m][n],
                 const float highest[k][m][n], const float mixed[k][m][n], const int32_t apart[k],
                 const float ink[k][n], const float by_radius[k][n], const float by_shift[k][n],
                 const float by_blur[k][n], const float by_sharpening[k][n], const float along[n],
@@ -276,7 +278,7 @@ void cctag_rays(count k, count m, count n, const float values[k][m][n],
 
 /* Ink of circles, whose radii are below 0 where paper fills them, along rays, and its changes by
    the radius, by the shift, px, by ln of the blur, and by the sharpening by an unsharp mask. */
-void cctag_rings(count k, count c, count n, const double circles[k][c], const double size[k],
+void cctag_rings(rows k, count c, count n, const double circles[k][c], const double size[k],
                  const double shift[k], const double blur[k], const double sharpening[k],
                  const float along[n], double mask, float ink[k][n], float by_radius[k][n],
                  float by_shift[k][n], float by_blur[k][n], float by_sharpening[k][n],
@@ -308,7 +310,7 @@ void place_rivals(count k, const double places[k][2], const double reach[k],
 
 /* Which quadrilaterals are bright outside and dark inside all sides, at distances from the middle:
    for a share of places along each, paper is so many times brighter. */
-void dark_inside(count h, count w, count k, count n, const uint8_t gray[h][w],
+void dark_inside(count h, count w, rows k, count n, const uint8_t gray[h][w],
                  const double frames[k][3][3], const double along[n], double outside,
                  double inside, double offset, double times, double share, bool dark[k]);
 /* By how much the log odds of markers of n by n cells grow where a cell is paper, and those where
@@ -316,7 +318,7 @@ void dark_inside(count h, count w, count k, count n, const uint8_t gray[h][w],
    has s by s cells, of some size, px, with the border and one more cell of paper around it. Each is
    read by the mean of the parts of its cells, and where light may be spread, by the darkest part of
    each, too. Where light changes along the border, cells are compared with its brightest ink and the darkest paper. Either has a price. */
-void cell_evidence(count h, count w, count k, count s, count n, const uint8_t gray[h][w],
+void cell_evidence(count h, count w, rows k, count s, count n, const uint8_t gray[h][w],
                    const double frames[k][3][3], const double sizes[k][2], const double blurs[k],
                    const bool spread[k], const double window[s], const double places[5][2],
                    double offset, double most_mixed, double minimum_step, double of_usual,
@@ -330,7 +332,7 @@ void cell_evidence(count h, count w, count k, count s, count n, const uint8_t gr
 /* The likeliest of w words in four turns, its log odds and those of others against it, where they
    are possible, and otherwise a bound of its log odds. Words have bits, and a prior against them; few
    edges speak against them as cells, and corners for them as shapes. */
-void likeliest_words(count k, count c, count b, count w, const float paper[k][c],
+void likeliest_words(rows k, count c, count b, count w, const float paper[k][c],
                      const double ink[k], const double square[k], const bool anyway[k],
                      const uint8_t words[b][w][4], const float prior[w], const double few[w],
                      const double shapes[w], double doubt, double figures, double possible,
@@ -343,7 +345,7 @@ void likeliest_words(count k, count c, count b, count w, const float paper[k][c]
    the least and the most, in sides), where samples at m places along either side, in cells of
    their own, are more than `inner` from the middle. Shares are of samples that look like the print,
    0 where it did not settle; covariances are those of shifts of the frame. */
-void laid_prints(count h, count w, count k, count n, count m, count g, const float gray[h][w],
+void laid_prints(count h, count w, rows k, count n, count m, count g, const float gray[h][w],
                  const double start[k][3][3], const bool ink[k][n][n], const double places[m],
                  const int32_t cells[m], const double blurs[k][3], double inner,
                  double largest_step, double settled, double outlier, double normal_spread,
@@ -357,21 +359,21 @@ void laid_prints(count h, count w, count k, count n, count m, count g, const flo
 /* Which of s outlines about points, and in which of the sizes radii[1] to radii[20], has the highest
    mean step, from dark to bright times a scale. Outlines are in steps of the sizes, from the first
    one: a whole number of them, and what is beside; each has a least size. */
-void best_outlines(count h, count w, count k, count s, const int16_t log[h][w],
+void best_outlines(count h, count w, rows k, count s, const int16_t log[h][w],
                    const double points[k][2], const double scale[k], const double rays[2][24],
                    const double radii[22], const int32_t bins[s][24], const float beside[s][24],
                    const double least[s], const double counted[2], int32_t best[k][2],
                    double scores[k]);
 /* Frames of ellipses moved onto the strongest steps in a window (px, least and most radii) along up
    to 64 rays, and the share of rays with a clear step that is near. */
-void moved_ellipses(count h, count w, count k, count m, const int16_t log[h][w],
+void moved_ellipses(count h, count w, rows k, count m, const int16_t log[h][w],
                     const double start[k][3][3], const double scale[k], const double rays[2][m],
                     const double basis[m][5], const double places[13], const double window[3],
                     const double counted[2], double flat, double least, double clear,
                     double outlier, int16_t rounds, const double prior[5], const double inlier[2],
                     double frames[k][3][3], double shares[k]);
 /* What makes ellipses as large as they are in gray values. */
-void gray_sizes(count h, count w, count k, const int16_t log[h][w], const double frames[k][3][3],
+void gray_sizes(count h, count w, rows k, const int16_t log[h][w], const double frames[k][3][3],
                 const double polarity[k], const double rays[2][16], const double places[13],
                 const double window[3], double unit, double flat, double sizes[k]);
 

@@ -10,7 +10,7 @@
 /* Gray values of an image between pixels, in a range that begins at `lift` instead of at 0, at m
    directions on r circles about k targets, the innermost first; beyond the border the nearest pixel
    counts. The image shows all of a target, or a direction of it up to a radius. */
-void circle_values(count h, count w, count k, count r, count m, const float image[h][w],
+void circle_values(count h, count w, rows k, count r, count m, const float image[h][w],
                    const double frames[k][3][3], const double directions[2][m],
                    const double radii[k][r], const float lift[k], float values[k][r][m],
                    double reach[k][m])
@@ -40,7 +40,7 @@ void circle_values(count h, count w, count k, count r, count m, const float imag
 }
 
 /* The same of an image of whole numbers, in units of its own, and whether it shows all of them. */
-void short_values(count h, count w, count k, count r, count m, const int16_t image[h][w],
+void short_values(count h, count w, rows k, count r, count m, const int16_t image[h][w],
                   const double frames[k][3][3], const double directions[2][m],
                   const double radii[k][r], double unit, double values[k][m][r], bool inside[k])
 {
@@ -65,7 +65,7 @@ void short_values(count h, count w, count k, count r, count m, const int16_t ima
 
 /* The median size, at m points of targets, of the second difference of rows of the second difference
    of columns; 0 in images that have none. */
-void second_differences(count h, count w, count k, count m, const float image[h][w],
+void second_differences(count h, count w, rows k, count m, const float image[h][w],
                         const double frames[k][3][3], const double points[2][m], double medians[k],
                         double scratch[m])
 {
@@ -98,7 +98,7 @@ void second_differences(count h, count w, count k, count m, const float image[h]
    beyond the outline that is brighter than `white`, less one for each that is darker. Circles
    nearer than `least` do not vote. `beyond` is the number of circles beyond an outline at an angle.
    Where the outermost circle is not brighter, which its votes tell, there are none for outlines. */
-void ground_votes(count k, count i, count c, count m, count s, const float gray[i][c][m],
+void ground_votes(rows k, count i, count c, count m, count s, const float gray[i][c][m],
                   const int64_t row[k], const float white[k][m], const double radii[k][c],
                   const double least[k], const int64_t beyond[s][m], int64_t votes[k][s],
                   int64_t outermost[k], int32_t sums[c][m])

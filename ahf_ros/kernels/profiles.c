@@ -7,7 +7,7 @@
 
 /* Where outlines have edges in images of their plane: places, px, normals outwards, px a unit
    across the edge, px to the next point, and curvature, 1/px. */
-void edge_points(count k, count m, const double frames[k][3][3], const double points[m][2],
+void edge_points(rows k, count m, const double frames[k][3][3], const double points[m][2],
                  const double normals[m][2], const double curvature[m], const double spacing[m],
                  double no_length, double images[k][m][2], double outwards[k][m][2],
                  double scale[k][m], double distance[k][m], double bend[k][m])
@@ -99,7 +99,7 @@ static inline void sample_profile(count h, count w, const float gray[h][w], cons
 
 /* The step on each profile, with filters for its group, fitted about the offset that explains
    most. */
-void fit_steps(count h, count w, count k, count m, count g, count f, const float gray[h][w],
+void fit_steps(count h, count w, rows k, count m, count g, count f, const float gray[h][w],
                const double points[k][m][2], const double normals[k][m][2],
                const int16_t polarity[k][m], const double spacing[k][m],
                const double curvature[k][m], const double blur[k], const int32_t groups[k][m],

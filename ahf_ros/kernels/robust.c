@@ -11,7 +11,7 @@ void selected_medians(count k, count m, const double values[k][m], const bool se
 }
 
 /* Linear models of values of each row. */
-void linear_fits(count k, count m, count n, const double values[k][m], const double weights[k][m],
+void linear_fits(rows k, count m, count n, const double values[k][m], const double weights[k][m],
                  const double basis[m][n], const double prior[n], double scale, int16_t rounds,
                  double unknowns[k][n], double residuals[k][m], double robust[m],
                  double normal[n][n], double products[m][n][n])

@@ -23,7 +23,7 @@ static double sampled(count h, count w, const uint8_t gray[h][w], const double f
                    (frame[1][0] * x + frame[1][1] * y + frame[1][2]) / scale);
 }
 
-void dark_inside(count h, count w, count k, count n, const uint8_t gray[h][w],
+void dark_inside(count h, count w, rows k, count n, const uint8_t gray[h][w],
                  const double frames[k][3][3], const double along[n], double outside,
                  double inside, double offset, double times, double share, bool dark[k])
 {
@@ -246,7 +246,7 @@ static double corner_odds(double outermost, double half, double step, const doub
     return sharpness * (1 - blurred) * ((1 + blurred) / 2 - level);
 }
 
-void cell_evidence(count h, count w, count k, count s, count n, const uint8_t gray[h][w],
+void cell_evidence(count h, count w, rows k, count s, count n, const uint8_t gray[h][w],
                    const double frames[k][3][3], const double sizes[k][2], const double blurs[k],
                    const bool spread[k], const double window[s], const double places[5][2],
                    double offset, double most_mixed, double minimum_step, double of_usual,

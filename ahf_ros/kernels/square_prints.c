@@ -258,7 +258,7 @@ static struct fit set_residuals(count m, const double places[m], bool grows,
     return fit;
 }
 
-void laid_prints(count h, count w, count k, count n, count m, count g, const float gray[h][w],
+void laid_prints(count h, count w, rows k, count n, count m, count g, const float gray[h][w],
                  const double start[k][3][3], const bool ink[k][n][n], const double places[m],
                  const int32_t cells[m], const double blurs[k][3], double inner,
                  double largest_step, double settled, double outlier, double normal_spread,

@@ -44,7 +44,7 @@ static double log_sum(count n, const float odds[n][TURNS])
     return highest + logarithm((double)sum[0] + sum[1] + sum[2] + sum[3]);
 }
 
-void likeliest_words(count k, count c, count b, count w, const float paper[k][c],
+void likeliest_words(rows k, count c, count b, count w, const float paper[k][c],
                      const double ink[k], const double square[k], const bool anyway[k],
                      const uint8_t words[b][w][4], const float prior[w], const double few[w],
                      const double shapes[w], double doubt, double figures, double possible,

@@ -1,6 +1,7 @@
 """What is done with every call of a kernel in these tests.
 
-Some are made again with any values: they end, and under `make test-sanitized` no index leaves an
+All whose rows threads may share are made again by three threads, with the same results. Some are
+made again with any values: they end, and under `make test-sanitized` no index leaves an
 array. With `--emulated COMMAND`, all are made on another machine as well.
 """
 
@@ -13,9 +14,11 @@ from unittest import mock
 import numpy as np
 import pytest
 
+from ahf_ros import kernels
 from ahf_ros.kernels import Kernel
 from support import emulated
 
+CALLED = Kernel.__call__
 CALLS: Counter[str] = Counter()
 HOSTILE = 12
 """Calls of a kernel in a module that are made again with any values."""
@@ -35,13 +38,29 @@ def hostile(array: np.ndarray, generator: np.random.Generator) -> np.ndarray:
     )
 
 
+def check_by_threads(kernel: Kernel, *values: Any, **counts: int) -> None:
+    """Check that a kernel has the same results where three threads share its rows."""
+    # What no kernel writes is the same, too.
+    with mock.patch.object(np, 'empty', np.zeros), mock.patch.object(kernels, 'WORTH', -1.0):
+        alone = CALLED(kernel, *values, **counts)
+        with kernels.shared(3):
+            by_threads = CALLED(kernel, *values, **counts)
+    both = (of if isinstance(of, tuple) else (of,) for of in (alone, by_threads))
+    for each, one, other in zip(kernel._plan[1], *both, strict=True):
+        if kernel._rows in each.sides:  # and no scratch
+            np.testing.assert_array_equal(one, other, f'{each.name} of {kernel.name}')
+
+
 @pytest.fixture(scope='module', autouse=True)
-def any_values() -> Iterator[None]:
-    called, calls, generator = Kernel.__call__, Counter[str](), np.random.default_rng(0)
+def any_values(pytestconfig: pytest.Config) -> Iterator[None]:
+    emulating = pytestconfig.getoption('--emulated', None)
+    calls, generator = Counter[str](), np.random.default_rng(0)
 
     def call(kernel: Kernel, *values: Any, **counts: int) -> Any:
-        results = called(kernel, *values, **counts)
+        results = CALLED(kernel, *values, **counts)
         calls[kernel.name] += 1
+        if kernel._rows and not emulating:
+            check_by_threads(kernel, *values, **counts)
         for share in (0.2, 0.5, 1) if calls[kernel.name] <= HOSTILE else ():
             changed = [
                 hostile(np.asarray(value, each.dtype), generator)
@@ -49,7 +68,7 @@ def any_values() -> Iterator[None]:
                 else value
                 for each, value in zip(kernel._plan[0], values, strict=True)
             ]
-            called(kernel, *changed, **counts)
+            CALLED(kernel, *changed, **counts)
         return results
 
     with mock.patch.object(Kernel, '__call__', call):

@@ -98,3 +98,27 @@ def test_kernels_are_attributes_and_nothing_else_is() -> None:
     assert 'likeliest_bits' in dir(kernels)
     with pytest.raises(AttributeError, match="has no attribute 'likeliest_bit'"):
         kernels.likeliest_bit  # noqa: B018
+
+
+FORKED = """
+import os
+import time
+import numpy as np
+from ahf_ros import kernels
+
+kernels.WORTH = -1.0
+frames, points, ones = np.tile(np.eye(3), (8, 1, 1)), np.ones((4, 2)), np.ones(4)
+with kernels.shared(2):
+    kernels.edge_points(frames, points, points, ones, ones, 1e-9)
+    time.sleep(0.1)  # until its threads wait for work
+    child = os.fork()
+    kernels.edge_points(frames, points, points, ones, ones, 1e-9)
+    if child:
+        raise SystemExit(os.waitpid(child, 0)[1])
+"""
+
+
+@pytest.mark.skipif(not hasattr(os, 'fork'), reason='processes are not forked here')
+def test_threads_share_rows_in_a_process_that_was_forked_too() -> None:
+    done = subprocess.run([sys.executable, '-W', 'ignore', '-c', FORKED], timeout=60)
+    assert done.returncode == 0

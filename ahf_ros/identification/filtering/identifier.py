@@ -23,6 +23,7 @@ from typing import Any
 
 import numpy as np
 
+from ahf_ros import kernels
 from ahf_ros.base.blas import one_blas_thread
 from ahf_ros.base.deprecation import deprecated_arguments
 from ahf_ros.base.edge_shift import median_edge_shift
@@ -216,6 +217,7 @@ class Identifier:
         self._detector = _interruptible(detector, interrupt)
         self._draft = _interruptible(draft, interrupt)
         self._settings = settings = settings or AdaptiveSettings()
+        self._threads = settings.threads or os.cpu_count() or 1
         self._fusion = settings.fusion and settings.tuning.search != PUBLISHED
         if patience and not settings.genetic.patience:
             genetic = replace(settings.genetic, patience=patience)
@@ -290,7 +292,12 @@ class Identifier:
             Whatever the detector, the refinement or the estimate raises.
         """
         stack = image if isinstance(image, ImageStack) else ImageStack((image,))
-        return self._identified(stack, self._trials(stack), expected_targets)
+        with kernels.shared(self._threads):
+            return self._of_stack(stack, expected_targets)
+
+    def _of_stack(self, stack: ImageStack, expected: int | None) -> Identification:
+        """Identify the targets of a stack; see `identify`."""
+        return self._identified(stack, self._trials(stack), expected)
 
     def _identified(
         self, stack: ImageStack, trials: Trials, expected_targets: int | None
@@ -304,7 +311,7 @@ class Identifier:
         expected = len(wanted_ids) or given
         estimating = not expected and self._estimate is not None
         seen = self._look_again(trials)
-        threads = settings.threads or os.cpu_count() or 1
+        threads = self._threads
         with ThreadPoolExecutor(threads) if threads > 1 else nullcontext() as executor:
             choice = self._steady(trials, executor) if estimating else None
             if choice is None:

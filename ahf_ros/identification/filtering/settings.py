@@ -189,8 +189,8 @@ class AdaptiveSettings:
     )
     threads: int = parameter(
         0,
-        'Number of filters tried at the same time; 0: one per processor core. The result is the '
-        'same.',
+        'Number of filters tried at the same time, and of threads that share the work on one '
+        'image; 0: one per processor core. The result is the same.',
         minimum=0,
         maximum=256,
     )
