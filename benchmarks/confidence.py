@@ -8,7 +8,7 @@ detectors read pictures of three makers where readings begin to fail
 (`support.pictures.conditions.pictures`), and the table shows how often what they state is right:
 what is reported, and undecoded targets whose likely ID is uncertain, from a confidence of 0.5 on.
 `off` is by how much that is more than 3 % and two standard deviations of so many draws away.
-With --calibrate, what they state is fitted to such pictures (`ahf_ros.families.calibration`).
+With --calibrate, what they state is fitted to such pictures (`ahf_ros.families.dots.calibration`).
 Seeds from 101 on are for tests, those below for development.
 
     python -m benchmarks.confidence [--family ring] [--seeds 101 102]
@@ -37,9 +37,10 @@ import numpy as np
 from scipy.optimize import minimize
 
 from ahf_ros.base.target import UNDECODED, Target, UndecodedTarget
-from ahf_ros.families import DetectorSettings, calibration, create_detector
-from ahf_ros.families.calibration import KNOTS
+from ahf_ros.families import DetectorSettings, create_detector
+from ahf_ros.families.dots import calibration
 from ahf_ros.families.dots import rings as dots
+from ahf_ros.families.dots.calibration import KNOTS
 from ahf_ros.families.dots.detector import find_rings
 from ahf_ros.families.gsi import hypotheses as gsi
 from ahf_ros.families.gsi.detector import find_hypotheses as find_gsi_hypotheses
@@ -440,14 +441,14 @@ def of_makers(families: Sequence[str], seed: int) -> Parts:
             yield np.full(len(right), maker), stated, right
 
 
-def calibrated(kind: str, seeds: Sequence[int]) -> np.ndarray:
-    """Return the probabilities at all knots but the last one for a kind of detector, shape (3,).
+def calibrated(seeds: Sequence[int]) -> np.ndarray:
+    """Return the probabilities of rings of dots at all knots but the last one, shape (3,).
 
-    They have the highest likelihood under a weak prior for those that a detector is sure of, and
+    They have the highest likelihood under a weak prior for those that the detector is sure of, and
     are no higher than these: in photographs by strangers, such are right (`benchmarks.makers`).
     """
-    _, stated, right = gathered(partial(of_makers, [kind]), seeds)
-    sure = calibration.sure_of(stated, kind)
+    _, stated, right = gathered(partial(of_makers, ['dots']), seeds)
+    sure = calibration.sure_of(stated)
     used = (sure > KNOTS[0]) & (sure < KNOTS[-1])
     odds, knots = log_odds(sure[used]), log_odds(KNOTS)
 
@@ -487,7 +488,7 @@ def main() -> None:
         print('\n'.join(diagram(options.diagram or FIRST, options.seeds)))
     elif options.calibrate:
         seeds = options.calibrate
-        values = {kind: calibrated(kind, seeds) for kind in calibration.KINDS}
+        values = {'values': calibrated(seeds)}
         write_weights('calibration', '--calibrate', seeds, values, calibration.WEIGHTS)
     elif options.fit:
         kind = KINDS[options.family]

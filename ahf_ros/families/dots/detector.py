@@ -14,8 +14,8 @@ import numpy as np
 
 from ahf_ros.base.blas import one_blas_thread
 from ahf_ros.base.target import DottedTarget, Target, sorted_targets
-from ahf_ros.families.calibration import stated
 from ahf_ros.families.contract import DetectorSettings, moved_targets
+from ahf_ros.families.dots.calibration import stated
 from ahf_ros.families.dots.discs import judged, small_discs, voted_discs, whole_discs
 from ahf_ros.families.dots.rings import CERTAIN, Rings, fit_targets, likely_targets, read_discs
 from ahf_ros.families.pyramid_detector import PyramidDetector
@@ -46,7 +46,7 @@ class DotsDetector(PyramidDetector):
         """Identify the targets of one image; see `Searching`."""
         found = targets_of_octaves(pyramid, self.settings.radii, self._identify, self.refine)
         best = self.reported(found, self.design.border_radius, CERTAIN)
-        return sorted_targets(stated(best, self.name))
+        return sorted_targets(stated(best))
 
     @one_blas_thread()
     def refine(self, image: np.ndarray, targets: Sequence[Target]) -> list[Target]:
