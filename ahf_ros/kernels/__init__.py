@@ -225,7 +225,12 @@ class Kernel:
         """Call it for parts of the rows at the same time."""
         bounds = [taken[self._rows] * number // parts for number in range(parts + 1)]
         pieces = [self._piece(taken, *of) for of in pairwise(bounds)]
-        others = [_pool().submit(self._run, of) for of in pieces[1:]]
+        others = []
+        for piece in pieces[1:]:
+            try:
+                others.append(_pool().submit(self._run, piece))
+            except RuntimeError:  # the process ends, and no thread begins any more
+                self._run(piece)
         self._run(pieces[0])
         for other in others:
             other.result()

@@ -122,3 +122,25 @@ with kernels.shared(2):
 def test_threads_share_rows_in_a_process_that_was_forked_too() -> None:
     done = subprocess.run([sys.executable, '-W', 'ignore', '-c', FORKED], timeout=60)
     assert done.returncode == 0
+
+
+ENDING = """
+import threading
+import numpy as np
+from ahf_ros import kernels
+
+def go_on():
+    threading.main_thread().join()
+    kernels.WORTH = -1.0
+    frames, points, ones = np.tile(np.eye(3), (2, 1, 1)), np.ones((4, 2)), np.ones(4)
+    with kernels.shared(2):
+        print(kernels.edge_points(frames, points, points, ones, ones, 1e-9)[0].sum())
+
+threading.Thread(target=go_on).start()
+"""
+
+
+def test_a_thread_that_outlives_the_main_one_goes_on_alone() -> None:
+    command = [sys.executable, '-c', ENDING]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60)
+    assert (done.stdout, done.stderr, done.returncode) == ('16.0\n', '', 0)
