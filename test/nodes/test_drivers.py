@@ -38,14 +38,18 @@ import json, os, signal, sys
 from ahf_ros.nodes.start import start
 import ahf_ros.nodes.detector, ahf_ros.nodes.registration
 
-every = json.loads(sys.argv[1])
+every, leave = json.loads(sys.argv[1]), os._exit
 for name, arguments in every:
     if not os.fork():
-        sys.exit(start(name, ['--ros-args', *arguments]))
+        leave(start(name, ['--ros-args', *arguments]))
 signal.signal(signal.SIGINT, signal.SIG_IGN)
 sys.exit(sum(os.waitstatus_to_exitcode(os.wait()[1]) for _ in every))
 """
-"""Several nodes for the imports of two, and no threads of numpy that a fork would leave behind."""
+"""Several nodes for the imports of two, and no threads of numpy that a fork would leave behind.
+
+LTTng, which comes with ROS 2, has threads that it would end as a process exits, where forked ones
+have none: they leave.
+"""
 
 GIVEN = {'registration': 'true', 'family': SCENE.family}
 ARGUMENTS = {'ensenso': {'cloud_offset_x': str(NARROWER)}}
