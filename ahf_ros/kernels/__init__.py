@@ -245,15 +245,11 @@ class Kernel:
         for each in self.parameters:
             if not each.sides or (each.given and self._rows not in each.sides):
                 continue
-            value = taken[each.name]
-            some = [
-                slice(start, stop) if side == self._rows else slice(None) for side in each.sides
-            ]
-            part = value[tuple(some)]
-            whole = each.sides[0] == self._rows  # rows follow each other
+            some = [slice(start, stop) if of == self._rows else slice(None) for of in each.sides]
+            part = taken[each.name][tuple(some)]
             if each.given:
                 part = np.ascontiguousarray(part)
-            elif not whole:
+            elif each.sides[0] != self._rows:  # its rows do not follow each other
                 part = np.empty(part.shape, each.dtype)
             piece[each.name] = part
         return piece
