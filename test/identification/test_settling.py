@@ -158,6 +158,7 @@ def test_a_family_that_appears_in_a_stream_is_found(first: str, second: str, lig
         found = identifier.identify(both)
     assert [it.key for it in found if it.family == second] == [it.key for it in other.targets]
     assert set(identifier.memory.families) == {first, second}
+    assert found.looked_for == 'auto'
     found = identifier.identify(both)
     assert set(found.looked_for.split(',')) == {first, second}
 
@@ -168,7 +169,7 @@ def test_what_stands_still_is_rarely_looked_at_again_until_it_changes() -> None:
     alone = np.hstack([render(replace(half, targets=number)).image for number in (4, 0)])
     other = render(replace(half, family='gsi', dot_radius=5, seed=5))
     both = np.hstack([alone[:, :450], other.image])
-    noise = np.random.default_rng(1).normal(0.0, 1.5, (36, *alone.shape))
+    noise = np.random.default_rng(1).normal(0.0, 1.5, (44, *alone.shape))
     identifier = create_identifier(threads=1)
     named = create_identifier(family='metashape12', threads=1)
 
@@ -178,7 +179,7 @@ def test_what_stands_still_is_rarely_looked_at_again_until_it_changes() -> None:
 
     still = [calls(np.clip(np.rint(alone + it), 0, 255).astype(np.uint8)) for it in noise]
     assert sum(of > 1.5 for of in still) > 5
-    assert sum(of > 1.2 for of in still[-12:]) <= 1
+    assert max(still[-12:]) < 1.2
     assert identifier.memory.families == ('metashape12',)
     since = identifier.memory.glanced
     while 'gsi' not in identifier.memory.families and identifier.memory.glanced < since + 25:
