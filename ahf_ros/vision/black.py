@@ -4,27 +4,40 @@ Ink reflects a few hundredths of the light that paper does. Where an image shows
 contrast was raised, black was clipped or the image was never photographed, the logarithm
 exaggerates the dark end of every blurred edge, and marks look wider or narrower than they are.
 Lifting black to what prints have undoes that.
+
+Where a camera sharpens as well, dark ground beside bright marks is darker than elsewhere by some
+gray values, which the logarithm makes steps as high as those of ink. Lifting black by more, as to
+`NEARLY_LINEAR`, makes them small, and the light on a target matters less than it does.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-_PRINTED = 0.25  # ratio of the gray values of ink and paper to which black is lifted
+PRINTED = 0.25
+"""Ratio of the gray values of ink and paper in usual prints, to which black is lifted."""
+
+NEARLY_LINEAR = 0.6
+"""The same for dark ground that sharpening makes uneven.
+
+Of 28 bright targets in a photograph, 20 are read without it, 25 with 0.6, 26 with 0.8 and 21 with
+1; of 480 in rendered scenes, 430 with 0.6 and 421 with 0.75.
+"""
 
 
-def black_lift(contrast: np.ndarray, bright: np.ndarray) -> np.ndarray:
+def black_lift(contrast: np.ndarray, bright: np.ndarray, ratio: float = PRINTED) -> np.ndarray:
     """Return the gray values that black is lifted to, float64, of the shape of both arrays.
 
-    `contrast` is the ratio of the gray values of ink and paper, from 0.2 of which on black stays
-    as it is, and `bright` the gray value of paper.
+    `contrast` is the ratio of the gray values of ink and paper, and `bright` the gray value of
+    paper. The larger the `ratio` to which black is lifted, the larger the contrast from which on
+    it stays as it is, which is 0.2 for that of prints.
 
     Examples
     --------
     >>> black_lift(np.array([0.0, 0.3]), np.array([200.0, 200.0])).round()
     array([53.,  0.])
     """
-    wanted = _PRINTED * (1 - contrast)
+    wanted = ratio * (1 - contrast)
     missing = np.maximum(wanted - contrast, 0) * bright
     return missing / (1 - wanted + missing / 255)
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from ahf_ros import kernels
 from ahf_ros.vision.array_record import ArrayRecord
-from ahf_ros.vision.black import black_lift, lifted
+from ahf_ros.vision.black import PRINTED, black_lift, lifted
 from ahf_ros.vision.circle_fit import Fit
 from ahf_ros.vision.image import SATURATED
 from ahf_ros.vision.logarithm import LOG_OFFSET
@@ -43,7 +43,6 @@ CIRCLES = 56
 """Of a polar image, which are then less than a tenth of a dot radius apart."""
 
 _MARGIN = 0.95  # of the last circle beyond the band, dot radii
-_PRINTED = 0.25  # usual contrast of prints, up to which the levels of dots count
 _LEVELS = np.array([0.75, 1.4])  # where those of dot and gap are read, radii of the dot as seen
 _MINIMUM_SHARE = 0.3  # of ink that a level tells, between those of dot and gap
 _NARROW = 4.5  # width of a gap that blur fills, in deviations of it
@@ -181,12 +180,16 @@ def polar_images(
     band: tuple[float, float],
     count: int,
     circles: int = CIRCLES,
+    ratio: float = PRINTED,
 ) -> PolarImages:
-    """Return the polar images of targets at some angles, see `angles_of`, on some circles."""
+    """Return the polar images of targets at some angles, see `angles_of`, on some circles.
+
+    Black is lifted to a `ratio` of ink and paper, see `black_lift`.
+    """
     inner, outer = band
     outermost = outer + _MARGIN
     radii = np.linspace(INNERMOST, outermost, circles)
-    contrast, lift = _appearance(gray, dots, band)
+    contrast, lift = _appearance(gray, dots, band, ratio)
     values, reach = on_circles(gray, dots.frames, angles_of(count), radii, lift)
     places = [*(1 + (inner - 1) * GAP), *(outer + MARGIN)]
     ground = values[:, [np.abs(radii - place).argmin() for place in places]]
@@ -231,7 +234,7 @@ def on_circles(
 
 
 def _appearance(
-    gray: np.ndarray, dots: Fit, band: tuple[float, float]
+    gray: np.ndarray, dots: Fit, band: tuple[float, float], ratio: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return contrasts of dots, and gray values that black is to be lifted to, shape (k,) each.
 
@@ -253,10 +256,10 @@ def _appearance(
         _unmixed(medians(inside / of), deep, share) ** dots.polarity
         for of, share in ((outside, near), (np.mean(beyond, axis=0), 0.0))
     )
-    contrast = np.maximum(dots.contrast, np.minimum(by_levels, _PRINTED))
+    contrast = np.maximum(dots.contrast, np.minimum(by_levels, PRINTED))
     narrow = (inner - 1) * dots.size < _NARROW * np.maximum(dots.blur, USUAL_BLUR)
-    contrast = np.where(narrow, np.minimum(contrast, np.maximum(bare, _PRINTED)), contrast)
-    lift = black_lift(contrast, dots.bright)
+    contrast = np.where(narrow, np.minimum(contrast, np.maximum(bare, PRINTED)), contrast)
+    lift = black_lift(contrast, dots.bright, ratio)
     dark, bright = (lifted(of, lift) for of in (contrast * dots.bright, dots.bright))
     return np.maximum(dark, _MINIMUM_LEVEL) / np.maximum(bright, _MINIMUM_LEVEL), lift
 

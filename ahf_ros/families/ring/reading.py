@@ -44,6 +44,7 @@ from ahf_ros.families.ring.polar import (
 )
 from ahf_ros.prints.ring import RingPrint, least_marked
 from ahf_ros.vision import frame
+from ahf_ros.vision.black import NEARLY_LINEAR, PRINTED
 from ahf_ros.vision.circle_fit import ENOUGH, NO_FITS, Fit, fit_circles
 
 PER_SECTOR = 10
@@ -51,6 +52,7 @@ PER_SECTOR = 10
 
 _PROPORTION = 0.06  # by which bands may be larger or smaller beside their dots than printed
 _THIN = 1.5  # width of a band, in deviations of blur, up to which its dot alone is measured
+_POSSIBLE = 0.01  # confidence of a doubtful reading, from which black is lifted by more
 _SHIFTS = np.arange(-2.4, 2.41, 0.4)  # of edges, that are tried, px
 
 
@@ -130,7 +132,30 @@ def _read_part(
     prior: Prior,
     least: np.ndarray | float = -np.inf,
 ) -> Hypotheses:
-    """Return what bands are read as in the frames of their drafts; see `read_bands`."""
+    """Return what bands are read as in the frames of their drafts; see `read_bands`.
+
+    Ground that is darker than ink is in prints may be uneven by sharpening alone. Bright targets
+    on it that are doubtful in the logarithm are read nearly in gray values as well.
+    """
+    read = _read_lifted(gray, fit, family, prior, least, PRINTED)
+    black = (fit.polarity < 0) & (fit.contrast < PRINTED)
+    some = np.flatnonzero(black & ~read.certain & (read.confidence >= _POSSIBLE))
+    if not some.size:
+        return read
+    again = _read_lifted(gray, fit.select(some), family, prior, -np.inf, NEARLY_LINEAR)
+    surer = again.confidence > read.confidence[some]
+    return read.replaced(some[surer], again.select(surer))
+
+
+def _read_lifted(
+    gray: np.ndarray,
+    fit: Fit,
+    family: RingPrint,
+    prior: Prior,
+    least: np.ndarray | float,
+    ratio: float,
+) -> Hypotheses:
+    """Return the same with black lifted to a ratio of ink and paper, see `black_lift`."""
     unread = Hypotheses.unread(fit, family)
     if not len(fit.frames):
         return unread
@@ -138,7 +163,7 @@ def _read_part(
     printed = np.abs(fit.proportion - 1) < _PROPORTION
     bands = replace(fit, frames=frame.scaled(fit.frames, np.where(printed, fit.proportion, 1)))
     growth = fit.polarity * fit.edge_shift / bands.size
-    polar = polar_images(gray, bands, family.band, family.bits * PER_SECTOR)
+    polar = polar_images(gray, bands, family.band, family.bits * PER_SECTOR, ratio=ratio)
     polar = on_dark_ground(polar, family.band, fit.share >= ENOUGH)
     edges = edge_evidence(polar, np.ones(len(growth)), growth, family.band, SHARES)
     words = decode(edges, _overhang(growth, family), family, prior.expected)
