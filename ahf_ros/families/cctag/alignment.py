@@ -44,8 +44,7 @@ _GROWTH_HIDES = 3.0  # ln of odds, at the most growth
 _SHARPENING_HIDES = 0.8  # ln of odds, of an amount of 1
 _CLIPPING_HIDES = 3.0  # ln of odds, where all gray values are clipped
 _PLAIN = -5.0, 5.0  # beyond which it says no more
-_BY_SIZE, _USUAL_SIZE = 2.5, 12.0  # what `plain` grows by ln of the radius, from its px
-_USUAL_BLURS = 14.0  # the same radius, in standard deviations of the usual blur
+_BY_SIZE, _SMALL = 2.5, 12.0  # what `plain` grows by ln of the radius, up to so many px
 _AS_CLEAR = -6.0  # as it gets, by anything that is round
 _OF_ID = np.array([-1.4, 1.2])  # of one, margin
 
@@ -83,12 +82,9 @@ class Aligned(ArrayRecord):
     @property
     def of_target(self) -> np.ndarray:
         """Probability that there is a target, shape (k,)."""
-        size = frame.mean_radii(self.frames)
-        # Blur takes from large targets what their size adds.
-        large = np.maximum(np.log(size / self.blur / _USUAL_BLURS), 0)
-        plain = self.plain - _BY_SIZE * np.minimum(np.log(size / _USUAL_SIZE), large)
-        clear = np.maximum(self.clear, _AS_CLEAR)
-        features = [clear, np.clip(plain, *_PLAIN), self.unusual, self.by_pixels]
+        small = np.minimum(frame.mean_radii(self.frames) / _SMALL, 1)
+        plain = np.clip(self.plain - _BY_SIZE * np.log(small), *_PLAIN)
+        features = [np.maximum(self.clear, _AS_CLEAR), plain, self.unusual, self.by_pixels]
         return logistic(np.stack(features, axis=1), _OF_TARGET)
 
     @property
