@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from typing_extensions import Self
 
     from ahf_ros.prints.prints import Print
+    from ahf_ros.vision.parts import Part
     from ahf_ros.vision.pyramid import ImagePyramid
 
 Code = TypeVar('Code', bound='Print')
@@ -25,10 +26,6 @@ _MINIMUM_RADIUS = 4.0  # of a dot, px, where the user sets none
 _MINIMUM_RADII = {'gsi': 2.0, 'dots': 2.5}  # of kinds whose dot is small beside the target
 
 _SIGNS = {'both': (1, -1), 'dark': (1,), 'bright': (-1,)}  # of the colour of dots
-
-
-Part = tuple[int, int, int, int]
-"""A part of an image: its edges left, top, right and bottom, px."""
 
 
 class Unavailable(ValueError):

@@ -8,8 +8,8 @@ from math import hypot
 import numpy as np
 
 from ahf_ros.base.target import DottedTarget, Prints, Target, reach_of
-from ahf_ros.families.contract import Part
 from ahf_ros.vision.frame import affine_frames
+from ahf_ros.vision.parts import Part
 
 MARGIN = 1.15
 """Times the reach of a target, within which the blur of its edges is."""

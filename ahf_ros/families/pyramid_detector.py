@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, ClassVar
 
@@ -12,6 +12,7 @@ import numpy as np
 from ahf_ros.base.target import Target
 from ahf_ros.families.claims import reported
 from ahf_ros.families.contract import ExpectingDetector
+from ahf_ros.vision.faint_targets import with_faint_targets
 from ahf_ros.vision.image import as_gray, check_image
 from ahf_ros.vision.pyramid import ImagePyramid, image_pyramid
 
@@ -43,6 +44,16 @@ class PyramidDetector(ExpectingDetector):
     @abstractmethod
     def search(self, pyramid: ImagePyramid) -> list[Target]:
         """Identify the targets of one image; see `Searching`."""
+
+    def found(
+        self, pyramid: ImagePyramid, search: Callable[[ImagePyramid], list[Target]]
+    ) -> list[Target]:
+        """Return what a search finds in an image, and in its parts of faint contrast."""
+
+        def stretched(gray: np.ndarray) -> list[Target]:
+            return search(image_pyramid(gray, self.settings.max_radius, self.contrast))
+
+        return with_faint_targets(pyramid.image, search(pyramid), stretched)
 
     def contesting(self) -> Self:
         """Return a detector that also returns targets that share an ID; see `Contesting`."""

@@ -13,17 +13,18 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import combinations
 
 import cv2
 import numpy as np
 
 from ahf_ros.base.target import UNDECODED, Prints, Target, reach_of
-from ahf_ros.families.contract import Confirmed, Part
+from ahf_ros.families.contract import Confirmed
 from ahf_ros.families.explained import MARGIN
 from ahf_ros.identification.filtering.identifier import Seen
 from ahf_ros.identification.filtering.trials import DetectorFunction
+from ahf_ros.vision.faint_targets import displaced
 from ahf_ros.vision.noise import usual_noise
+from ahf_ros.vision.parts import Part, area, joined
 
 _AROUND = 1.6  # half the side of what is looked for again, in semi-axes of a target's ellipse
 _FARTHEST = 1.5  # by which a target may have moved, in its semi-axes
@@ -95,7 +96,7 @@ class Following:
         height, width = image.shape
         lost = [it for index, it in enumerate(known) if index not in confirmed]
         lost += [*before.lost, *(it for it in before.targets if it.id == UNDECODED)]
-        lost = [_displaced(it, *(_to(movement, it) - (it.x, it.y))) for it in lost]
+        lost = [displaced(it, *(_to(movement, it) - (it.x, it.y))) for it in lost]
         lost = [it for it in lost if _holds((0, 0, width, height), it)]
         reach = max(map(self._reach, (*known, *lost)), default=0.0)
         turn = _part(image.shape, before.turn, self.interval)
@@ -105,8 +106,8 @@ class Following:
         changed = _changed(image, before.image, movement, reach)
         changes = [*self._changes(changed, followed, math.ceil(max(2 * reach, _AT_LEAST)))]
         parts += changes
-        parts = _joined(parts) if len(parts) <= _FEW else parts
-        if sum(map(_area, parts)) > _MOST * image.size or len(parts) > _FEW:
+        parts = joined(parts, _EACH) if len(parts) <= _FEW else parts
+        if sum(map(area, parts)) > _MOST * image.size or len(parts) > _FEW:
             parts = [(0, 0, width, height)]
         found = again.search(parts) if parts else again.targets
         where = {it.print: it for it in followed}
@@ -179,7 +180,7 @@ def _where(image: np.ndarray, known: Sequence[Target]) -> list[Target]:
     moved[told] = np.column_stack([best % (2 * _BESIDE + 1), best // (2 * _BESIDE + 1)])
     moved[~told] = np.rint(np.median(moved[told], axis=0))
     moved += np.array([column, row]) - _BESIDE - reach
-    return [_displaced(it, *of) for it, of in zip(known, (size * moved).tolist(), strict=True)]
+    return [displaced(it, *of) for it, of in zip(known, (size * moved).tolist(), strict=True)]
 
 
 def _dot(target: Target, x: int, y: int, half: int, size: int) -> np.ndarray:
@@ -331,28 +332,3 @@ def _grown(part: Part, margin: int, shape: tuple[int, int]) -> Part:
         min(right + margin, width),
         min(bottom + margin, height),
     )
-
-
-def _joined(parts: Iterable[Part]) -> list[Part]:
-    """Return parts of an image, two as one where this is no more work."""
-    joined = list(parts)
-    while True:
-        for first, second in combinations(range(len(joined)), 2):
-            one, other = joined[first], joined[second]
-            left, top = min(one[0], other[0]), min(one[1], other[1])
-            both = left, top, max(one[2], other[2]), max(one[3], other[3])
-            if _area(both) <= _area(one) + _area(other) + _EACH:
-                joined[first] = both
-                del joined[second]
-                break
-        else:
-            return joined
-
-
-def _area(part: Part) -> int:
-    return (part[2] - part[0]) * (part[3] - part[1])
-
-
-def _displaced(target: Target, x: float, y: float) -> Target:
-    """Return a target that lies elsewhere in an image."""
-    return replace(target, x=target.x + x, y=target.y + y)

@@ -20,13 +20,13 @@ import numpy as np
 
 from ahf_ros.base.target import UNDECODED, Identification, Target, UndecodedTarget
 from ahf_ros.base.target_check import checked_targets
-from ahf_ros.families.contract import Part
 from ahf_ros.families.evidence import Reading, evidence, is_clear, reading_of
 from ahf_ros.families.explained import without_targets
 from ahf_ros.families.undecoded import undecoded
 from ahf_ros.identification.filtering.genetic import Values
 from ahf_ros.identification.filtering.identifier import Identifier, Memory
 from ahf_ros.identification.filtering.trials import DetectorFunction, Trials
+from ahf_ros.vision.parts import Part
 from ahf_ros.vision.stack import ImageStack
 
 FIRST = 3

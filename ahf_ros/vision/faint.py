@@ -15,6 +15,7 @@ import cv2
 import numpy as np
 
 from ahf_ros.vision.logarithm import LOG_OFFSET
+from ahf_ros.vision.parts import joined
 
 TILE = 64
 """Side of the tiles whose contrast is measured, px."""
@@ -31,6 +32,7 @@ _MINIMUM_RANGE = 14.0  # of gray values, in standard deviations of the noise
 _STEPS = 16  # pixels of a tile that have a step, at least
 _MINIMUM_STEP = 0.4  # height of a step, in the range
 _CLEAR_STEP = 10.0  # the same, in standard deviations of the noise
+_EACH = 120  # tiles, half a million pixels, to which the search of a part amounts at the least
 _GROUP = 2  # faint tiles side by side, for the part to be worth reading
 _ROUNDING = 0.15  # noise of gray values that were whole numbers
 _NO_WEIGHT = 1e-6  # instead of no known tile
@@ -58,14 +60,13 @@ def faint_parts(gray: np.ndarray) -> Iterator[FaintPart]:
     box = np.ones((3, 3), np.uint8)
     around = cv2.dilate(faint.astype(np.uint8), box)
     low, high = _spread(low, faint), _spread(high, faint)
-    count, labels, boxes, _ = cv2.connectedComponentsWithStats(around, connectivity=8)
-    for label in range(1, count):
-        left, top, width, height, _ = boxes[label]
-        rows, columns = slice(top, top + height), slice(left, left + width)
-        part = gray[TILE * top : TILE * (top + height), TILE * left : TILE * (left + width)]
-        within = labels[rows, columns] == label
-        stretched = _stretched(part, low[rows, columns], high[rows, columns], within)
-        yield FaintPart(x=TILE * int(left), y=TILE * int(top), gray=stretched)
+    _, _, boxes, _ = cv2.connectedComponentsWithStats(around, connectivity=8)
+    groups = [(x, y, x + width, y + height) for x, y, width, height, _ in boxes[1:].tolist()]
+    for left, top, right, bottom in joined(groups, _EACH):
+        tiles = np.s_[top:bottom, left:right]
+        part = gray[TILE * top : TILE * bottom, TILE * left : TILE * right]
+        stretched = _stretched(part, low[tiles], high[tiles], around[tiles] > 0)
+        yield FaintPart(x=TILE * left, y=TILE * top, gray=stretched)
 
 
 def _measured_tiles(gray: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

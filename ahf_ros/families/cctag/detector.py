@@ -76,15 +76,19 @@ class CctagDetector(PyramidDetector):
     @one_blas_thread()
     def search(self, pyramid: ImagePyramid) -> list[Target]:
         """Identify the targets of one image; see `Searching`."""
-        pyramid, radii = _unclipped(pyramid), self.settings.radii
+        found = self.found(_unclipped(pyramid), self._of_pyramid)
+        return sorted_targets(self.reported(found, 1.0, _CERTAIN))
+
+    def _of_pyramid(self, pyramid: ImagePyramid) -> list[Target]:
+        """Return what a pyramid shows, some of it twice."""
+        radii = self.settings.radii
         kinds = list(product(self.settings.polarities, self.design))
         looks = _looks(list(octaves(pyramid, *radii)), kinds, Prior(expected=self.expected))
 
         def identify(octave: Octave) -> list[Target]:
             return self._identify(octave.pyramid.gray, looks[octave.level])
 
-        found = targets_of_octaves(pyramid, radii, identify, self.refine)
-        return sorted_targets(self.reported(found, 1.0, _CERTAIN))
+        return targets_of_octaves(pyramid, radii, identify, self.refine)
 
     @one_blas_thread()
     def refine(self, image: np.ndarray, targets: Sequence[Target]) -> list[Target]:

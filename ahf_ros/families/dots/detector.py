@@ -44,7 +44,7 @@ class DotsDetector(PyramidDetector):
     @one_blas_thread()
     def search(self, pyramid: ImagePyramid) -> list[Target]:
         """Identify the targets of one image; see `Searching`."""
-        found = targets_of_octaves(pyramid, self.settings.radii, self._identify, self.refine)
+        found = self.found(pyramid, self._targets)
         best = self.reported(found, self.design.border_radius, CERTAIN)
         return sorted_targets(stated(best))
 
@@ -75,6 +75,9 @@ class DotsDetector(PyramidDetector):
             )
         ]
         return moved_targets(targets, dotted, places, good)
+
+    def _targets(self, pyramid: ImagePyramid) -> list[Target]:
+        return targets_of_octaves(pyramid, self.settings.radii, self._identify, self.refine)
 
     def _identify(self, octave: Octave) -> list[DottedTarget]:
         """Return the targets of an octave, in its pixels."""

@@ -76,12 +76,15 @@ class GsiDetector(PyramidDetector):
     @one_blas_thread()
     def search(self, pyramid: ImagePyramid) -> list[Target]:
         """Identify the targets of one image; see `Searching`."""
-        found = targets_of_octaves(pyramid, self.settings.radii, self._identify, self.refine)
+        found = self.found(pyramid, self._targets)
         single = [target for target in found if target.id == UNDECODED]
         coded = [target for target in found if target.id != UNDECODED]
         reach = SAME * self.design.reach / float(self.design.template_radii[self.design.reference])
         coded = self.reported(coded, reach, CERTAIN)
         return sorted_targets([*coded, *map(undecoded, single)])
+
+    def _targets(self, pyramid: ImagePyramid) -> list[Target]:
+        return targets_of_octaves(pyramid, self.settings.radii, self._identify, self.refine)
 
     def _identify(self, octave: Octave) -> list[Target]:
         """Return the targets of an octave, in its pixels."""

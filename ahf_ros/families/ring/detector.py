@@ -16,7 +16,7 @@ import numpy as np
 
 from ahf_ros.base.blas import one_blas_thread
 from ahf_ros.base.target import Target, sorted_targets
-from ahf_ros.families.contract import Confirmed, DetectorSettings, Part
+from ahf_ros.families.contract import Confirmed, DetectorSettings
 from ahf_ros.families.pyramid_detector import PyramidDetector
 from ahf_ros.families.ring.bands import with_measured_bands
 from ahf_ros.families.ring.choice import choose_families, further_families
@@ -51,6 +51,7 @@ from ahf_ros.vision.dots import Dots
 from ahf_ros.vision.ellipse_targets import frames_of, targets_from_frames
 from ahf_ros.vision.faint import faint_parts
 from ahf_ros.vision.image import as_gray, check_image
+from ahf_ros.vision.parts import Part
 from ahf_ros.vision.pyramid import ImagePyramid, Octave, bare_pyramid, image_pyramid, octaves
 
 _PART = 128  # dots of one colour that are read at a time

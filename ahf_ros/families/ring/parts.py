@@ -11,10 +11,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ahf_ros.families.contract import Part
 from ahf_ros.families.ring.known import Explained
 from ahf_ros.vision import frame
 from ahf_ros.vision.dots import NO_DOTS, Dots, distinct
+from ahf_ros.vision.parts import Part
 from ahf_ros.vision.pyramid import ImagePyramid, Octave, image_pyramid
 
 _ALIGNED = 32  # px; halves of parts that begin there are parts of the halves

@@ -25,6 +25,7 @@ from ahf_ros.families.square.quadrilaterals import find_quadrilaterals
 from ahf_ros.families.square.reading import MINIMUM_ODDS, NOTHING, Readings, read
 from ahf_ros.families.undecoded import undecoded
 from ahf_ros.prints.square import are_plain, words
+from ahf_ros.vision.faint import faint_parts
 from ahf_ros.vision.frame import reduced
 from ahf_ros.vision.image import as_gray, check_image
 from ahf_ros.vision.logistic import probability
@@ -82,6 +83,26 @@ class SquareDetector(ExpectingDetector):
         check_image(image)
         gray = np.ascontiguousarray(as_gray(image).astype(np.uint8, copy=False))
         groups = self.design
+        every = [self._readings(gray, groups)]
+        for part in faint_parts(gray):
+            shown = self._readings(np.rint(part.gray).astype(np.uint8), groups)
+            corners = shown.corners + np.array([part.x, part.y])
+            every.append(replace(shown, corners=corners).select(shown.odds > MINIMUM_ODDS))
+        readings = Readings.joined(every)
+        stretched = np.arange(len(readings.odds)) >= len(every[0].odds)
+        uncertain = readings.odds <= MINIMUM_ODDS
+        readings = readings.select(np.lexsort([-readings.odds, stretched, uncertain]))
+        readings = readings.select(_owning(readings))
+        decoded = readings.odds > MINIMUM_ODDS
+        markers = _markers(readings, decoded, groups)
+        return sorted_targets(
+            it if is_decoded else undecoded(it)
+            for it, is_decoded in zip(markers, decoded.tolist(), strict=True)
+            if is_decoded or self.settings.report_undecoded
+        )
+
+    def _readings(self, gray: np.ndarray, groups: Groups) -> Readings:
+        """Return what quadrilaterals of an image of uint8 and of its halves are read as."""
         levels = max(0, int(log2(max(min(gray.shape) / _SMALLEST_HALF, 1))))
         expected, everything = self.expected, self.settings.report_undecoded
         found = [NOTHING]
@@ -106,16 +127,7 @@ class SquareDetector(ExpectingDetector):
         odds = np.minimum(doubtful.odds, MINIMUM_ODDS)
         odds = np.concatenate([_odds_together(sure, groups), odds])
         readings = replace(Readings.joined([sure, doubtful]), odds=odds)
-        readings = _of_usual_borders(readings)
-        readings = readings.select(np.argsort(-readings.odds, kind='stable'))
-        readings = readings.select(_owning(readings))
-        decoded = readings.odds > MINIMUM_ODDS
-        markers = _markers(readings, decoded, groups)
-        return sorted_targets(
-            it if is_decoded else undecoded(it)
-            for it, is_decoded in zip(markers, decoded.tolist(), strict=True)
-            if is_decoded or everything
-        )
+        return _of_usual_borders(readings)
 
     @one_blas_thread()
     def refine(self, image: np.ndarray, targets: Sequence[Target]) -> list[Target]:
