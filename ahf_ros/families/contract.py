@@ -187,6 +187,15 @@ class Contesting(Protocol):
 
 
 @runtime_checkable
+class Stretching(Protocol):
+    """A detector that also reads parts of an image whose contrast is faint, stretched."""
+
+    def unstretched(self) -> Detector:
+        """Return the same detector for clear contrast alone."""
+        ...
+
+
+@runtime_checkable
 class Searching(Protocol):
     """A detector that begins with the pyramid of an image, which detectors of one image share."""
 
@@ -386,16 +395,23 @@ class FamilyDetector(ABC):
 
 @dataclass(frozen=True, slots=True)
 class ExpectingDetector(FamilyDetector):
-    """A detector that may know which IDs are likely; see `Expecting`.
+    """A detector that may know which IDs are likely; see `Expecting` and `Stretching`.
 
     Attributes
     ----------
     settings : DetectorSettings
     expected : frozenset of int
         IDs that are likely to be there. Empty: all IDs are equally likely.
+    stretches : bool
+        Whether parts of faint contrast are read as well.
     """
 
     expected: frozenset[int] = frozenset()
+    stretches: bool = True
+
+    def unstretched(self) -> Self:
+        """Return a detector for clear contrast alone; see `Stretching`."""
+        return replace(self, stretches=False)
 
     def expecting(self, ids: frozenset[int]) -> Self:
         """Return a detector that knows which IDs are likely; see `Expecting`."""

@@ -49,6 +49,8 @@ class PyramidDetector(ExpectingDetector):
         self, pyramid: ImagePyramid, search: Callable[[ImagePyramid], list[Target]]
     ) -> list[Target]:
         """Return what a search finds in an image, and in its parts of faint contrast."""
+        if not self.stretches:
+            return search(pyramid)
 
         def stretched(gray: np.ndarray) -> list[Target]:
             return search(image_pyramid(gray, self.settings.max_radius, self.contrast))

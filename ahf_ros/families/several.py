@@ -3,7 +3,8 @@
 What a detector takes for a target may be a part of another one: the dot of a ring may be one dot
 of many. A place belongs to one target, the surer one, of equally sure ones the larger. Where all
 families are looked for and one detector finds targets of its own beyond doubt, the next ones look
-at an image in which these are painted over, which takes them a fraction of the time. Dots that
+at an image in which these are painted over, which takes them a fraction of the time, and at its
+clear contrast alone. Dots that
 were found beside them are not looked for again, and those that search for dots do not look at all
 where the first one left none that its targets do not explain.
 """
@@ -30,6 +31,7 @@ from ahf_ros.families.contract import (
     Explaining,
     Refiner,
     Searching,
+    Stretching,
 )
 from ahf_ros.families.evidence import is_clear
 from ahf_ros.families.explained import without_targets
@@ -103,6 +105,10 @@ class SeveralDetector:
         parts = [it.contesting() if isinstance(it, Contesting) else it for it in self.parts]
         return replace(self, parts=tuple(parts))
 
+    def unstretched(self) -> SeveralDetector:
+        """Return a detector for clear contrast alone; see `Stretching`."""
+        return replace(self, parts=tuple(map(_unstretched, self.parts)))
+
     def narrowed(self, families: Sequence[str]) -> Detector:
         """Return the detector of some of the families; see `Narrowing`."""
         return self.narrow(families)
@@ -118,7 +124,8 @@ class SeveralDetector:
         dots: np.ndarray | None = None  # that no target explains, once these are known
         results: list[list[Target]] = []
         left = image
-        for part in self.parts:
+        for any_contrast in self.parts:
+            part = any_contrast if left is image else _unstretched(any_contrast)
             together = shared and isinstance(part, Searching)
             nothing = together and left is not image and dots is not None and not len(dots)
             if nothing or left.min() == left.max():  # all that there was is painted over
@@ -183,6 +190,11 @@ class SeveralDetector:
         for target in found:
             known = target.id == UNDECODED or target.family in families
             yield target if known else replace(target, family=families[0])
+
+
+def _unstretched(detector: Detector) -> Detector:
+    """Return a detector for clear contrast alone, as far as it is one for another."""
+    return detector.unstretched() if isinstance(detector, Stretching) else detector
 
 
 def _beside(dots: np.ndarray, targets: Sequence[Target], prints: Prints) -> np.ndarray:

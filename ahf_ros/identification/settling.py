@@ -20,6 +20,7 @@ import numpy as np
 
 from ahf_ros.base.target import UNDECODED, Identification, Target, UndecodedTarget
 from ahf_ros.base.target_check import checked_targets
+from ahf_ros.families.contract import Stretching
 from ahf_ros.families.evidence import Reading, evidence, is_clear, reading_of
 from ahf_ros.families.explained import without_targets
 from ahf_ros.families.undecoded import undecoded
@@ -279,10 +280,12 @@ class SettlingIdentifier(Identifier):
         return [name for group in self._groups if likely & {*group} for name in group]
 
     def _seen(self, image: np.ndarray) -> list[Target]:
-        """Return what an image shows of all families."""
+        """Return what an image shows of all families in clear contrast."""
         if image.min() == image.max():
             return []
-        return list(checked_targets(self._detector(image), self._name))
+        detector = self._detector
+        detector = detector.unstretched() if isinstance(detector, Stretching) else detector
+        return list(checked_targets(detector(image), self._name))
 
     def _of(self, families: Sequence[str], image: np.ndarray) -> list[Target]:
         """Return what an image shows of some families."""

@@ -77,7 +77,8 @@ class RingDetector(PyramidDetector):
     @one_blas_thread()
     def explain(self, pyramid: ImagePyramid) -> tuple[list[Target], np.ndarray]:
         """Identify the targets of one image, and say what dots are left; see `Explaining`."""
-        hypotheses = hypotheses_in(pyramid, self.settings, self.expected)
+        read = hypotheses_in if self.stretches else read_pyramid
+        hypotheses = read(pyramid, self.settings, self.expected)
         found = report(hypotheses, self.settings, self.contested)
         return found, unexplained(hypotheses).frames
 
@@ -130,7 +131,7 @@ def hypotheses_in(
     pyramid: ImagePyramid, settings: DetectorSettings, expected: frozenset[int]
 ) -> Hypotheses:
     """Find the dots and words in an image pyramid; see `find_hypotheses`."""
-    found = read_pyramid(pyramid, settings, expected, PROPOSALS)
+    found = read_pyramid(pyramid, settings, expected)
     return _with_faint_parts(ImagePart(0, 0, pyramid), found, settings, expected)
 
 
@@ -199,7 +200,7 @@ def read_pyramid(
     pyramid: ImagePyramid,
     settings: DetectorSettings,
     expected: frozenset[int],
-    proposals: Sequence[Proposal],
+    proposals: Sequence[Proposal] = PROPOSALS,
     shown: Sequence[RingPrint] = (),
     parts: Sequence[ImagePart] | None = None,
     before: Hypotheses | None = None,

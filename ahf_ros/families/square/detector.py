@@ -84,7 +84,7 @@ class SquareDetector(ExpectingDetector):
         gray = np.ascontiguousarray(as_gray(image).astype(np.uint8, copy=False))
         groups = self.design
         every = [self._readings(gray, groups)]
-        for part in faint_parts(gray):
+        for part in faint_parts(gray) if self.stretches else ():
             shown = self._readings(np.rint(part.gray).astype(np.uint8), groups)
             corners = shown.corners + np.array([part.x, part.y])
             every.append(replace(shown, corners=corners).select(shown.odds > MINIMUM_ODDS))
