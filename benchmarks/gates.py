@@ -249,7 +249,7 @@ def seen(folder: Path, gate: Gate | None = None) -> dict[str, Seen]:
 
     Pictures that are not done in time, or whose detector does not work then, are missing.
     """
-    changed = (PACKAGE + gate.place, gate.opened) if gate else ()
+    changed = ('--', PACKAGE + gate.place, gate.opened) if gate else ()  # which may be negative
     command = [sys.executable, '-m', 'benchmarks.changed', str(folder), *changed]
     process = subprocess.Popen(
         command,
