@@ -86,7 +86,10 @@ def _measured_tiles(gray: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarra
 
 
 def _half(gray: np.ndarray) -> np.ndarray:
-    """Return an image at half its size, in whole tiles, float32."""
+    """Return an image at half its size, in whole tiles, float32.
+
+    At its border, where cameras and codecs leave lines of their own, it continues what is inside.
+    """
     rows, columns = (-(-side // TILE) for side in gray.shape)
     height, width = (max(side // 2, 1) for side in gray.shape)
     half = np.empty((height, width), np.float32)
@@ -94,6 +97,9 @@ def _half(gray: np.ndarray) -> np.ndarray:
         part = half[top : top + _HALF]
         values = gray[2 * top : 2 * (top + len(part))].astype(np.float32, copy=False)
         cv2.resize(values, part.shape[::-1], dst=part, interpolation=cv2.INTER_AREA)
+    if min(height, width) > 2:
+        half[[0, -1]] = half[[1, -2]]
+        half[:, [0, -1]] = half[:, [1, -2]]
     below, beside = rows * _HALF - height, columns * _HALF - width
     return cv2.copyMakeBorder(half, 0, below, 0, beside, borderType=cv2.BORDER_REFLECT)
 

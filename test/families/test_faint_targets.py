@@ -6,6 +6,7 @@ import pytest
 from ahf_ros.families import create_detector
 from ahf_ros.scenes.evaluation import score
 from ahf_ros.scenes.scene import SceneSettings, render
+from support.square_markers import needs_square_markers
 
 RADII = {
     'metashape12': 10.0,
@@ -18,7 +19,13 @@ RADII = {
 GRAY, RANGE, NOISE = 110, 24, 0.7  # gray value of black, and of white more than that
 
 
-@pytest.mark.parametrize('family', RADII)
+@pytest.mark.parametrize(
+    'family',
+    [
+        pytest.param(it, marks=needs_square_markers if it.startswith(('aruco', 'april')) else ())
+        for it in RADII
+    ],
+)
 def test_faint_targets_of_all_families_are_read_where_they_are(family: str) -> None:
     """Of the families without rings of arcs, none was read."""
     settings = SceneSettings(
