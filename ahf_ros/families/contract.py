@@ -22,6 +22,9 @@ if TYPE_CHECKING:
 Code = TypeVar('Code', bound='Print')
 """The prints of one kind."""
 
+Used = TypeVar('Used')
+"""A detector, or any callable that stands for one."""
+
 _MINIMUM_RADIUS = 4.0  # of a dot, px, where the user sets none
 _MINIMUM_RADII = {'gsi': 2.0, 'dots': 2.5}  # of kinds whose dot is small beside the target
 
@@ -193,6 +196,11 @@ class Stretching(Protocol):
     def unstretched(self) -> Detector:
         """Return the same detector for clear contrast alone."""
         ...
+
+
+def unstretched(detector: Used) -> Used | Detector:
+    """Return a detector for clear contrast alone, the same one if it never stretches any."""
+    return detector.unstretched() if isinstance(detector, Stretching) else detector
 
 
 @runtime_checkable

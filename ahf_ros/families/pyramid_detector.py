@@ -45,7 +45,7 @@ class PyramidDetector(ExpectingDetector):
     def search(self, pyramid: ImagePyramid) -> list[Target]:
         """Identify the targets of one image; see `Searching`."""
 
-    def found(
+    def in_any_contrast(
         self, pyramid: ImagePyramid, search: Callable[[ImagePyramid], list[Target]]
     ) -> list[Target]:
         """Return what a search finds in an image, and in its parts of faint contrast."""

@@ -31,7 +31,7 @@ from ahf_ros.families.contract import (
     Explaining,
     Refiner,
     Searching,
-    Stretching,
+    unstretched,
 )
 from ahf_ros.families.evidence import is_clear
 from ahf_ros.families.explained import without_targets
@@ -107,7 +107,7 @@ class SeveralDetector:
 
     def unstretched(self) -> SeveralDetector:
         """Return a detector for clear contrast alone; see `Stretching`."""
-        return replace(self, parts=tuple(map(_unstretched, self.parts)))
+        return replace(self, parts=tuple(map(unstretched, self.parts)))
 
     def narrowed(self, families: Sequence[str]) -> Detector:
         """Return the detector of some of the families; see `Narrowing`."""
@@ -124,8 +124,8 @@ class SeveralDetector:
         dots: np.ndarray | None = None  # that no target explains, once these are known
         results: list[list[Target]] = []
         left = image
-        for any_contrast in self.parts:
-            part = any_contrast if left is image else _unstretched(any_contrast)
+        for each in self.parts:
+            part = each if left is image else unstretched(each)
             together = shared and isinstance(part, Searching)
             nothing = together and left is not image and dots is not None and not len(dots)
             if nothing or left.min() == left.max():  # all that there was is painted over
@@ -190,11 +190,6 @@ class SeveralDetector:
         for target in found:
             known = target.id == UNDECODED or target.family in families
             yield target if known else replace(target, family=families[0])
-
-
-def _unstretched(detector: Detector) -> Detector:
-    """Return a detector for clear contrast alone, as far as it is one for another."""
-    return detector.unstretched() if isinstance(detector, Stretching) else detector
 
 
 def _beside(dots: np.ndarray, targets: Sequence[Target], prints: Prints) -> np.ndarray:

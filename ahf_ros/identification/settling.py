@@ -20,7 +20,7 @@ import numpy as np
 
 from ahf_ros.base.target import UNDECODED, Identification, Target, UndecodedTarget
 from ahf_ros.base.target_check import checked_targets
-from ahf_ros.families.contract import Stretching
+from ahf_ros.families.contract import unstretched
 from ahf_ros.families.evidence import Reading, evidence, is_clear, reading_of
 from ahf_ros.families.explained import without_targets
 from ahf_ros.families.undecoded import undecoded
@@ -193,6 +193,7 @@ class SettlingIdentifier(Identifier):
         super().__init__(
             lambda image: marked(detector(image)), *arguments, draft=drafted, **options
         )
+        self._detector_beside = unstretched(detector)
         self._kinds = kinds
         self._groups = [tuple(it) for it in groups]
         self._narrowed = narrowed
@@ -283,9 +284,8 @@ class SettlingIdentifier(Identifier):
         """Return what an image shows of all families in clear contrast."""
         if image.min() == image.max():
             return []
-        detector = self._detector
-        detector = detector.unstretched() if isinstance(detector, Stretching) else detector
-        return list(checked_targets(detector(image), self._name))
+        self._interrupt()
+        return list(checked_targets(marked(self._detector_beside(image)), self._name))
 
     def _of(self, families: Sequence[str], image: np.ndarray) -> list[Target]:
         """Return what an image shows of some families."""

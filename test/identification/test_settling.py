@@ -4,7 +4,7 @@ import json
 import math
 from collections import Counter
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 
 import cv2
@@ -16,7 +16,7 @@ from ahf_ros.families import create_detector
 from ahf_ros.families.explained import without_targets
 from ahf_ros.files.image_files import write_image
 from ahf_ros.identification.session import create_identifier, identify
-from ahf_ros.identification.settling import FIRST, evident, evident_together
+from ahf_ros.identification.settling import FIRST, evident, evident_together, memory_of
 from ahf_ros.scenes.scene import SceneSettings, render
 from support.calls import calls_of
 from support.command_line import status
@@ -211,6 +211,21 @@ def test_a_second_family_in_any_image_of_a_batch_is_found(
     last = json.loads(said.out.splitlines()[-1])
     assert Counter(it['family'] for it in last['targets']) == {'cct10': 4, 'aruco_5x5_50': 4}
     assert 'families: aruco_5x5_50, cct10\n' in said.err
+
+
+def test_other_families_are_looked_for_in_clear_contrast_alone() -> None:
+    """What is faint beside an image's own targets costs little; it took half as much again."""
+    settings = SceneSettings(width=640, height=480, targets=4, dot_radius=12.0, seed=1)
+    dots = render(replace(settings, family='gsi', dot_radius=5.0)).image
+    faint, known = np.rint(200 + dots / 255 * 24).astype(np.uint8), memory_of(('metashape12',))
+    identifier, calls = create_identifier(threads=1), list[int]()
+    for beside in (np.full_like(faint, 220), faint):
+        image = np.hstack([render(settings).image, beside])
+        identifier.memory = known  # as each image of a batch begins
+        identifier.identify(image)
+        identifier.memory = known
+        calls.append(calls_of(partial(identifier.identify, image)))
+    assert calls[1] < 1.2 * calls[0]
 
 
 @pytest.mark.parametrize('light', ['normal', 'stripe'])

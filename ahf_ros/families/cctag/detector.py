@@ -76,7 +76,7 @@ class CctagDetector(PyramidDetector):
     @one_blas_thread()
     def search(self, pyramid: ImagePyramid) -> list[Target]:
         """Identify the targets of one image; see `Searching`."""
-        found = self.found(_unclipped(pyramid), self._of_pyramid)
+        found = self.in_any_contrast(_unclipped(pyramid), self._of_pyramid)
         return sorted_targets(self.reported(found, 1.0, _CERTAIN))
 
     def _of_pyramid(self, pyramid: ImagePyramid) -> list[Target]:

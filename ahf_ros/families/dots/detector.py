@@ -44,7 +44,7 @@ class DotsDetector(PyramidDetector):
     @one_blas_thread()
     def search(self, pyramid: ImagePyramid) -> list[Target]:
         """Identify the targets of one image; see `Searching`."""
-        found = self.found(pyramid, self._targets)
+        found = self.in_any_contrast(pyramid, self._of_pyramid)
         best = self.reported(found, self.design.border_radius, CERTAIN)
         return sorted_targets(stated(best))
 
@@ -76,7 +76,8 @@ class DotsDetector(PyramidDetector):
         ]
         return moved_targets(targets, dotted, places, good)
 
-    def _targets(self, pyramid: ImagePyramid) -> list[Target]:
+    def _of_pyramid(self, pyramid: ImagePyramid) -> list[Target]:
+        """Return what a pyramid shows, some of it twice."""
         return targets_of_octaves(pyramid, self.settings.radii, self._identify, self.refine)
 
     def _identify(self, octave: Octave) -> list[DottedTarget]:

@@ -76,14 +76,15 @@ class GsiDetector(PyramidDetector):
     @one_blas_thread()
     def search(self, pyramid: ImagePyramid) -> list[Target]:
         """Identify the targets of one image; see `Searching`."""
-        found = self.found(pyramid, self._targets)
+        found = self.in_any_contrast(pyramid, self._of_pyramid)
         single = [target for target in found if target.id == UNDECODED]
         coded = [target for target in found if target.id != UNDECODED]
         reach = SAME * self.design.reach / float(self.design.template_radii[self.design.reference])
         coded = self.reported(coded, reach, CERTAIN)
         return sorted_targets([*coded, *map(undecoded, single)])
 
-    def _targets(self, pyramid: ImagePyramid) -> list[Target]:
+    def _of_pyramid(self, pyramid: ImagePyramid) -> list[Target]:
+        """Return what a pyramid shows, some of it twice."""
         return targets_of_octaves(pyramid, self.settings.radii, self._identify, self.refine)
 
     def _identify(self, octave: Octave) -> list[Target]:
