@@ -289,11 +289,27 @@ void cctag_rings(rows k, count c, count n, const double circles[k][c], const dou
 /* Areas, px^2, positive where they are clockwise in an image, lengths and boxes, px. */
 void outline_sizes(count n, count k, const int32_t points[n][2], const int64_t ends[k],
                    double areas[k], double lengths[k], int64_t boxes[k][2]);
-/* Lines, by their ends, through the points that are near to the middle of four sides, moved outwards;
-   and how many points the side with fewest has. */
-void side_lines(count n, count k, const int32_t points[n][2], const int64_t ends[k],
-                const double sides[k][4][2][2], const double near[k], const double outwards[k],
-                double middle, double least, double lines[k][4][2][2], double fewest[k]);
+
+/* straight.c */
+
+/* Straight edges, by their ends, px, with what is bright on the left: of the pixels that are marked,
+   whose gradients are given. They are so long at the least, their gradients differ by an angle, and
+   their pixels are so far away from a line, by the root of the mean square, at the most. */
+void straight_edges(count h, count w, count m, count e, const uint8_t marked[h][w],
+                    const int16_t across[h][w], const int16_t down[h][w], double cosine,
+                    double least, double away, double edges[m][4], int64_t found[1],
+                    int32_t taken[e], uint8_t left[h][w]);
+/* Quadrilaterals that edges enclose, with what is dark inside, clockwise in the image, and how many
+   of them, of corners and of sides there are. Edges meet up to gaps, px and their lengths, beyond
+   their ends, which are looked for within the third one; those of one side are straight up to an
+   offset, px, and by how much lines are bent, and are seen for a share of it. */
+void edge_quadrilaterals(count n, count tall, count wide, count c, count l, count q,
+                         const double edges[n][4], double side, const double gaps[3],
+                         double overlap, double turn, const double rules[5], double apart,
+                         double corners[q][4][2], int64_t found[1], int64_t cells[tall][wide],
+                         int64_t next[n], int64_t follows[n], int64_t begin[n], int64_t end[n],
+                         int64_t second[c], double places[c][2], int64_t first_link[c],
+                         int64_t last_link[c], int64_t links[l], int64_t next_one[q]);
 
 /* square_places.c */
 
@@ -326,6 +342,21 @@ void cell_evidence(count h, count w, rows k, count s, count n, const uint8_t gra
                    double unusual, const double weights[3], double corner, bool seen[2][k],
                    float paper[2][k][n][n], double odds[3][2][k], double levels[6][s][s],
                    double sums[6][3][s]);
+
+/* square_steps.c */
+
+/* By how much the log odds of markers of n by n cells grow where what is behind a line between two of
+   them is darker, or brighter: line by line, upright ones first. And those where all cells are ink,
+   those of square corners, and those of the border, of which a share is in the first. A grid has s by
+   s cells with the border and t = s + 1 lines either way. Steps of the logarithm are taken at m places
+   along a line, so far aside, in cells, and compared with the usual step of the sides, which is seen
+   where it is large enough. Light makes some steps, which any is one of by a small density. */
+void step_evidence(count h, count w, rows k, count s, count t, count n, count f, count m,
+                   const uint8_t gray[h][w], const double frames[k][3][3],
+                   const double sizes[k][2], const double places[m], double aside, double offset,
+                   double least, double deviation, double stray, double weight, double of_border,
+                   const double corner[4], bool seen[k], float features[k][f], double odds[3][k],
+                   double steps[2][t][s][m], double sides[4][s][m]);
 
 /* square_words.c */
 

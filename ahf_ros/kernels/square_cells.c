@@ -6,22 +6,13 @@
 #include "images.h"
 #include "kernels.h"
 #include "robust.h"
+#include "square.h"
 
 enum { SIDES = 4, PARTS = 5 };
 /* Planes of cells as a whole, by the mean and by the darkest of their parts; parts are between. */
 enum { MEAN, DARKEST = PARTS, PLANES };
 /* Sums along sides of a border, over which levels of ink and paper are known. */
 enum { TOTAL, MIDDLES, STEPS, SUMS };
-/* Logarithmic odds of a marker whose cells are ink, of square corners, and of the border. */
-enum { INK, SQUARE, AROUND };
-
-static double sampled(count h, count w, const uint8_t gray[h][w], const double frame[3][3],
-                      double x, double y)
-{
-    double scale = frame[2][0] * x + frame[2][1] * y + frame[2][2];
-    return byte_at(h, w, gray, (frame[0][0] * x + frame[0][1] * y + frame[0][2]) / scale,
-                   (frame[1][0] * x + frame[1][1] * y + frame[1][2]) / scale);
-}
 
 void dark_inside(count h, count w, rows k, count n, const uint8_t gray[h][w],
                  const double frames[k][3][3], const double along[n], double outside,
@@ -186,11 +177,6 @@ static bool set_sums(count s, const double level[s][s], const double window[s],
     return true;
 }
 
-static inline double bounded(double odds, double most)
-{
-    return lesser(greater(odds, -most), most);
-}
-
 /* Of the cells of a line: half of a step from ink to paper, and the step; odds of paper by the whole
    cell, and the sum of those by its parts; logarithms of what is more likely than either colour. */
 enum { HALF, STEP, OF_WHOLE, OF_PARTS, WHOLE_AGAINST, PARTS_AGAINST, LINES };
@@ -234,16 +220,6 @@ static void weigh_line(count s, count row, const double whole[s][s],
         line[WHOLE_AGAINST][c] = logarithm((1 + exponential(line[OF_WHOLE][c])) / 2);
         line[PARTS_AGAINST][c] = logarithm(line[PARTS_AGAINST][c]);
     }
-}
-
-/* Logarithmic odds of a square corner: its outermost part is as bright as paper if it is round. */
-static double corner_odds(double outermost, double half, double step, const double shown[2],
-                          double sharpness)
-{
-    double dark = exponential(-step / 2), bright = exponential(step / 2);
-    double level = (exponential(outermost - half) - dark) / (bright - dark);
-    double blurred = 1 - shown[0] * shown[1];
-    return sharpness * (1 - blurred) * ((1 + blurred) / 2 - level);
 }
 
 void cell_evidence(count h, count w, rows k, count s, count n, const uint8_t gray[h][w],

@@ -107,13 +107,11 @@ def edges_in_bands(log: np.ndarray, contrast: float = 1.0) -> Iterator[LogEdges]
     Those of large images come in bands of rows: lists of them take more memory than the image.
     """
     height, width = log.shape
-    weak, strong = _WEAK_EDGE * LOG_SCALE, _STRONG_EDGE * LOG_SCALE
-    gradient = _gradient(log, contrast, 0, height)
-    marked = cv2.Canny(*gradient, weak, strong, L2gradient=True)
+    marked, *gradient = find_marked(log, contrast)
     rows = max(_BAND // width, 1)
     for top in range(0, height, rows):
         if rows < height:
-            gradient = _gradient(log, contrast, top, top + rows)
+            gradient = [*_gradient(log, contrast, top, top + rows)]
         pixels = cv2.findNonZero(marked[top : top + rows])
         pixels = np.zeros((0, 2), np.int32) if pixels is None else pixels.reshape(-1, 2)
         x, y = pixels[:, 0].copy(), pixels[:, 1].copy()
@@ -121,6 +119,15 @@ def edges_in_bands(log: np.ndarray, contrast: float = 1.0) -> Iterator[LogEdges]
         strength = np.hypot(across, down)
         y += top
         yield LogEdges(log, contrast, marked, x, y, across / strength, down / strength, strength)
+
+
+def find_marked(
+    log: np.ndarray, contrast: float = 1.0
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return where a logarithmic image has edges, uint8, and its gradient, x and y, int16."""
+    weak, strong = _WEAK_EDGE * LOG_SCALE, _STRONG_EDGE * LOG_SCALE
+    across, down = _gradient(log, contrast, 0, len(log))
+    return cv2.Canny(across, down, weak, strong, L2gradient=True), across, down
 
 
 def _gradient(

@@ -9,16 +9,6 @@ import numpy as np
 from ahf_ros import kernels
 
 
-def points_of(outlines: Sequence[np.ndarray]) -> np.ndarray:
-    """Return the points of outlines, shape (n, 1, 2) each, one after the other, (m, 2)."""
-    return np.concatenate([np.zeros((0, 1, 2), np.int32), *outlines])[:, 0]
-
-
-def ends_of(outlines: Sequence[np.ndarray]) -> np.ndarray:
-    """Return where each of k outlines ends among these points, (k,)."""
-    return np.cumsum([*map(len, outlines)], dtype=np.int64)
-
-
 def measured(outlines: Sequence[np.ndarray]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the areas, lengths and boxes of k outlines of whole pixels, (n, 1, 2) each.
 
@@ -36,7 +26,7 @@ def measured(outlines: Sequence[np.ndarray]) -> tuple[np.ndarray, np.ndarray, np
     >>> measured([np.array([[[0, 0]], [[4, 0]], [[4, 3]]], np.int32)])
     (array([6.]), array([12.]), array([[5, 4]], dtype=int32))
     """
-    found: tuple[np.ndarray, np.ndarray, np.ndarray] = kernels.outline_sizes(
-        points_of(outlines), ends_of(outlines)
-    )
+    points = np.concatenate([np.zeros((0, 1, 2), np.int32), *outlines])[:, 0]
+    ends = np.cumsum([*map(len, outlines)], dtype=np.int64)
+    found: tuple[np.ndarray, np.ndarray, np.ndarray] = kernels.outline_sizes(points, ends)
     return found

@@ -35,7 +35,7 @@ from ahf_ros.vision.pyramid import halved
 # to 3 px, 0.021 of 169 markers and 0.032 of 85, none beyond three of these. On flat and on bent
 # sheets, in any light, edges or print are fitted: of 2,133 markers none was left.
 _DRAFT_DEVIATION = 0.028
-_SMALL = 28.0  # diagonal of a marker whose cells are not much larger than pixels, px
+_SMALL = 45.0  # diagonal of a marker whose cells are not much larger than pixels, px
 _SMALLEST_HALF = 24  # smaller side of a half that markers are looked for in, px
 _SAME_PLACE = 0.3  # distance of two readings of one marker, in sides
 _MANY = 1 << 32  # more than any dictionary has markers

@@ -52,6 +52,12 @@ def side_lengths(corners: np.ndarray) -> np.ndarray:
     return np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2)
 
 
+def cell_sizes(corners: np.ndarray, cells: int) -> np.ndarray:
+    """Return the lengths of cells along the first sides and the second ones, shape (k, 2)."""
+    lengths = side_lengths(corners) / cells
+    return (lengths[:, :2] + lengths[:, 2:]) / 2
+
+
 def square_frames(corners: np.ndarray) -> np.ndarray:
     """Return the frames of squares with corners, shape (k, 3, 3)."""
     frames: np.ndarray = kernels.square_frames(corners)

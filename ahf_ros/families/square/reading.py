@@ -1,11 +1,9 @@
 """Reading of square markers: evidence that a quadrilateral has the cells of a marker.
 
-All cells of the grid that a dictionary has are sampled, those of the border and one more around
-it with them. Ink and paper next to each other in these two rings tell what ink and paper are in
-the light of each cell. A cell speaks for paper by where it is between these levels, but never by
-more than it would if it may be covered. What speaks for a marker is compared with what any other
-cells would have done, and with what else has the same cells: a figure with few corners, such as a
-letter, is as likely as its description is short [1]_, and differs by the shape of its frame only.
+What speaks for a marker is compared with what any other cells would have done, and with what else
+has the same cells: a figure with few corners, such as a letter, is as likely as its description is
+short [1]_, and differs by the shape of its frame only. Steps between cells are seen in any light;
+where a border shows that light is even, the levels of cells say as much of soft and small ones.
 
 References
 ----------
@@ -14,7 +12,7 @@ References
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from math import exp, log
@@ -23,40 +21,28 @@ import cv2
 import numpy as np
 
 from ahf_ros import kernels
-from ahf_ros.families.square.frames import side_lengths, square_frames
+from ahf_ros.families.square.evidence import Evidence
+from ahf_ros.families.square.frames import square_frames
+from ahf_ros.families.square.levels import levels_of_cells
 from ahf_ros.families.square.shapes import parallel_odds
+from ahf_ros.families.square.steps import stepped, steps_between_cells
 from ahf_ros.families.words import against as of_expected
 from ahf_ros.prints.square import borders, corner_counts, words
 from ahf_ros.vision.array_record import ArrayRecord
 from ahf_ros.vision.logarithm import LOG_OFFSET
 
-_IN_CELL = ((0.0, 0.0), (-0.2, -0.2), (-0.2, 0.2), (0.2, -0.2), (0.2, 0.2))
-"""Where a cell is sampled, from its centre, in cells."""
-
-_CORNER = 0.3  # from a corner of the border, in cells
-_BLURS = 0.7, 0.4  # of a usual image and of a sharp one, standard deviations in px
-_SMALL_CELL = 2.0  # below which they differ, px
 _SMALLEST_CELL = 1.0  # that can be read, px
-_UNUSUAL = 3.0  # log odds against light that spreads over ink, or changes within a marker
-_MOST_MIXED = 0.2  # share that a cell takes from each neighbour, at most
-_REACH = 0.25  # standard deviation of the window that levels are taken from, in sides
-_EVERYWHERE = 1e-6  # weight of all others, if there is none in this window
 _MINIMUM_STEP = 0.35  # from ink to paper, in the logarithm
-_OF_USUAL = 0.4  # minimum of a step of the border, in usual ones
 _SIDE = 0.6  # minimum share of such steps of each side of the border
 _POINTS, _DEPTH = 10, 0.06  # of each side where a border is looked for, distance in sides
-_SHARPNESS = 12.0  # of a cell: its logarithmic odds, by its distance from the middle in steps
-_COVERED = 3.0  # maximum of these odds, as a cell may be covered
-_UNCLEAR = 1.5  # logarithmic odds against a cell that is between ink and paper
-_PART_WEIGHT = 0.15  # of each part of a cell, which have one colour in other quadrilaterals, too
-_BORDER_WEIGHT = 0.3  # of the cells of the border, which are alike in other quadrilaterals, too
-_CORNER_WEIGHT = 0.7
 _DOUBT = 6.0  # logarithmic odds against a marker that nothing but a quadrilateral speaks for
 _FIGURES = 7.0  # logarithmic odds of letters and the like against markers
 _POSSIBLE = -12.0  # minimum of these odds where all is as usual but a corner or the blur
 _CLEAR = -6.0  # maximum of the odds of other markers where these odds are low
-_WHOLE = -1.0  # logarithmic odds of the cells of a border, from which it is whole
 _PLAIN = 0.35  # logarithmic odds against a marker, for each edge less than random cells have
+
+_Features = Callable[[np.ndarray], np.ndarray]
+"""From the cells of words to what evidence is of."""
 
 MINIMUM_ODDS = 2.2
 """Logarithmic odds of a marker that is reported: nine to one."""
@@ -84,19 +70,6 @@ NOTHING = Readings(
     others=np.zeros(0),
     whole=np.zeros(0, bool),
 )
-
-
-@dataclass(frozen=True, slots=True)
-class _Evidence:
-    """What the cells of quadrilaterals within a border say; k of these, c cells in each."""
-
-    quadrilateral: np.ndarray  # (k,), its index
-    paper: (
-        np.ndarray
-    )  # float32, (k, c), by how much the log odds of a marker grow where a cell is paper
-    ink: np.ndarray  # (k,), logarithmic odds of a marker where all cells are ink
-    square: np.ndarray  # (k,), logarithmic odds of square corners
-    whole: np.ndarray  # (k,), whether the border is whole, bool
 
 
 def read(
@@ -129,38 +102,58 @@ def read(
             some = some[_dark_inside(gray, frames[some], innermost)]
         if not len(some):
             continue
-        places = frames[some], corners[some], sizes[some]
-        seen = _evidence(gray, *places, cells, border)
-        if not len(seen.quadrilateral):
-            continue
-        which = some[seen.quadrilateral]
-        seen = replace(seen, quadrilateral=which, square=seen.square + parallel[which])
-        found += [
-            _likely(seen, corners, tuple(group), index, border, expected, everything=everything)
-            for index, group in enumerate(groups)
-            if (cells, border) in grids[index]
-        ]
+        for seen, features in _seen(gray, frames[some], corners[some], sizes[some], cells, border):
+            if not len(seen.quadrilateral):
+                continue
+            which = some[seen.quadrilateral]
+            seen = replace(seen, quadrilateral=which, square=seen.square + parallel[which])
+            found += [
+                _likely(seen, features, corners, group, index, border, expected, everything)
+                for index, group in enumerate(map(tuple, groups))
+                if (cells, border) in grids[index]
+            ]
     readings = Readings.joined(found)
     shown = (readings.odds > MINIMUM_ODDS) | (readings.others < _CLEAR)
     return readings.select(shown | everything & readings.whole)
 
 
+def _seen(
+    gray: np.ndarray,
+    frames: np.ndarray,
+    corners: np.ndarray,
+    sizes: np.ndarray,
+    cells: int,
+    border: int,
+) -> Iterator[tuple[Evidence, _Features]]:
+    """Yield what quadrilaterals say within a border, with what the features of words are."""
+    steps, even = steps_between_cells(gray, frames, corners, cells, border)
+    which = np.flatnonzero(even)
+    levels = levels_of_cells(gray, frames[which], corners[which], sizes[which], cells, border)
+    yield replace(levels, quadrilateral=which[levels.quadrilateral]), _as_they_are
+    yield steps, stepped
+
+
+def _as_they_are(cells: np.ndarray) -> np.ndarray:
+    """Return cells (..., n, n) as features (..., n n)."""
+    return cells.reshape(*cells.shape[:-2], -1)
+
+
 def _likely(
-    seen: _Evidence,
+    seen: Evidence,
+    features: _Features,
     corners: np.ndarray,
     group: tuple[str, ...],
     index: int,
     border: int,
     expected: frozenset[int],
-    *,
     everything: bool,
 ) -> Readings:
     """Return what is likely to be a marker of a group, whose index and border are given."""
-    bits, prior, few, shapes = _table(group)
+    prior, few, shapes = _terms(group)
     prior = prior + of_expected(np.arange(len(prior)), expected)
-    of_words = bits, prior, few, shapes, _DOUBT, _FIGURES, _POSSIBLE
+    of_words = _bits(group, features), prior, few, shapes, _DOUBT, _FIGURES, _POSSIBLE
     best, total, others, likely, *_ = kernels.likeliest_words(
-        seen.paper, seen.ink, seen.square, everything & seen.whole, *of_words
+        seen.features, seen.ink, seen.square, everything & seen.whole, *of_words
     )
     number, turn = best[likely].T
     return Readings(
@@ -174,16 +167,24 @@ def _likely(
     )
 
 
+@lru_cache(maxsize=64)
+def _bits(group: tuple[str, ...], features: _Features) -> np.ndarray:
+    """Return the features of the markers of dictionaries in four turns, shape (bytes, n, 4)."""
+    cells = words(group[-1])
+    turned = np.stack([np.rot90(cells, turn, axes=(1, 2)) for turn in range(4)], axis=1)
+    bits = np.packbits(features(turned), axis=2, bitorder='little')
+    return np.ascontiguousarray(np.moveaxis(bits, 2, 0))
+
+
 @lru_cache(maxsize=32)
-def _table(group: tuple[str, ...]) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Return the bits of the markers of dictionaries in four turns, and three terms for each.
+def _terms(group: tuple[str, ...]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return three terms for each marker of dictionaries, shape (n,).
 
     Other markers speak against it, and textures, which have few edges between cells. The third
     term is the logarithmic odds against a figure that has just its corners, each at one of the
-    lines between cells, less the first one. The shapes are (bytes, n, 4) and thrice (n,).
+    lines between cells, less the first one.
     """
     cells = words(group[-1])
-    turned = np.stack([np.rot90(cells, turn, axes=(1, 2)) for turn in range(4)], axis=1)
     count = np.zeros(len(cells))
     for name in reversed(group):
         count[: len(words(name))] = 4 * len(words(name))
@@ -192,9 +193,7 @@ def _table(group: tuple[str, ...]) -> tuple[np.ndarray, np.ndarray, np.ndarray, 
     usual = cells.shape[1] * (cells.shape[1] + 1)
     others = np.log(count)
     shapes = corner_counts(group[-1]) * log(cells.shape[1] + 1) - others
-    few = _PLAIN * np.maximum(usual - edges, 0)
-    bits = np.packbits(turned.reshape(*turned.shape[:2], -1), axis=2, bitorder='little')
-    return np.ascontiguousarray(np.moveaxis(bits, 2, 0)), others, few, shapes
+    return others, _PLAIN * np.maximum(usual - edges, 0), shapes
 
 
 def _dark_inside(gray: np.ndarray, frames: np.ndarray, depth: float) -> np.ndarray:
@@ -206,54 +205,3 @@ def _dark_inside(gray: np.ndarray, frames: np.ndarray, depth: float) -> np.ndarr
     numbers = LOG_OFFSET, exp(_MINIMUM_STEP / 2), _SIDE
     dark: np.ndarray = kernels.dark_inside(gray, frames, *places, *numbers)
     return dark
-
-
-def _evidence(
-    gray: np.ndarray,
-    frames: np.ndarray,
-    corners: np.ndarray,
-    sizes: np.ndarray,
-    cells: int,
-    border: int,
-) -> _Evidence:
-    """Return what the cells of quadrilaterals within a border say.
-
-    All are there twice, once by the darkest part of each cell, as where light has spread from
-    paper over ink; those with small cells once more, as in a sharp image.
-    """
-    side = cells + 2 * border
-    small = np.flatnonzero(sizes < _SMALL_CELL * side)
-    every = np.arange(len(frames))
-    tried = np.concatenate([every, small])
-    counts = len(every), len(small)
-    blurs, spread = np.repeat(_BLURS, counts), np.repeat([True, False], counts)
-    lengths = side_lengths(corners[tried]) / side
-    reach = (np.arange(side + 2) / (_REACH * (side + 2))) ** 2
-    of_levels = LOG_OFFSET, _MOST_MIXED, _MINIMUM_STEP, _OF_USUAL, _SIDE, _EVERYWHERE
-    weights = np.array([_PART_WEIGHT, _BORDER_WEIGHT, _CORNER_WEIGHT])
-    seen, paper, (ink, square, around), *_ = kernels.cell_evidence(
-        gray,
-        frames[tried],
-        (lengths[:, :2] + lengths[:, 2:]) / 2,
-        blurs,
-        spread,
-        kernels.exponentials(-reach / 2),
-        np.array(_IN_CELL),
-        *of_levels,
-        _SHARPNESS,
-        _COVERED,
-        _UNCLEAR,
-        _UNUSUAL,
-        weights,
-        _CORNER,
-        n=cells,
-    )
-    which = np.flatnonzero(seen)
-    ink, square, around = (of.ravel()[which] for of in (ink, square, around))
-    return _Evidence(
-        tried[which % len(tried)],
-        paper.reshape(-1, cells**2)[which],
-        ink,
-        square,
-        (around > _WHOLE) & (square > 0),
-    )

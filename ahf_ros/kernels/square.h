@@ -1,0 +1,36 @@
+/* What evidence of square markers has in common, of levels and of steps. */
+
+#ifndef AHF_SQUARE_H
+#define AHF_SQUARE_H
+
+#include "elementary.h"
+#include "images.h"
+#include "kernels.h"
+
+/* Logarithmic odds of a marker whose cells are ink, of square corners, and of the border. */
+enum { INK, SQUARE, AROUND };
+
+static inline double sampled(count h, count w, const uint8_t gray[h][w],
+                             const double frame[3][3], double x, double y)
+{
+    double scale = frame[2][0] * x + frame[2][1] * y + frame[2][2];
+    return byte_at(h, w, gray, (frame[0][0] * x + frame[0][1] * y + frame[0][2]) / scale,
+                   (frame[1][0] * x + frame[1][1] * y + frame[1][2]) / scale);
+}
+
+static inline double bounded(double odds, double most)
+{
+    return lesser(greater(odds, -most), most);
+}
+
+/* Logarithmic odds of a square corner: its outermost part is as bright as paper if it is round. */
+static inline double corner_odds(double outermost, double half, double step, const double shown[2],
+                          double sharpness)
+{
+    double dark = exponential(-step / 2), bright = exponential(step / 2);
+    double level = (exponential(outermost - half) - dark) / (bright - dark);
+    double blurred = 1 - shown[0] * shown[1];
+    return sharpness * (1 - blurred) * ((1 + blurred) / 2 - level);
+}
+
+#endif

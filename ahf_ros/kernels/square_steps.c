@@ -1,0 +1,138 @@
+/* What the steps between the cells of quadrilaterals say of square markers. */
+
+#include <math.h>
+#include <string.h>
+
+#include "elementary.h"
+#include "kernels.h"
+#include "robust.h"
+#include "square.h"
+
+enum { FALLING, SAME, RISING, KINDS };
+static double logarithm_at(count h, count w, const uint8_t gray[h][w], const double frame[3][3],
+                           const double place[2], int axis, double offset)
+{
+    return logarithm(sampled(h, w, gray, frame, place[axis], place[1 - axis]) + offset);
+}
+
+/* Steps of the logarithm across the lines between the cells of a grid, upright lines first. */
+static void set_steps(count h, count w, count t, count s, count m, const uint8_t gray[h][w],
+                      const double frame[3][3], const double places[m], double aside,
+                      double offset, double steps[2][t][s][m])
+{
+    for (int axis = 0; axis < 2; axis++)
+        for (count line = 0; line < t; line++)
+            for (count cell = 0; cell < s; cell++)
+                for (count i = 0; i < m; i++) {
+                    double along = ((double)cell + 0.5 + places[i]) / (double)s - 0.5;
+                    double before[2] = {((double)line - aside) / (double)s - 0.5, along};
+                    double behind[2] = {((double)line + aside) / (double)s - 0.5, along};
+                    steps[axis][line][cell][i] =
+                        logarithm_at(h, w, gray, frame, behind, axis, offset) -
+                        logarithm_at(h, w, gray, frame, before, axis, offset);
+                }
+}
+
+/* The usual step across the sides of a grid, towards paper. */
+static double step_of_sides(count t, count s, count m, const double steps[2][t][s][m],
+                            double sides[4 * s * m])
+{
+    count n = 0;
+    for (int axis = 0; axis < 2; axis++)
+        for (count cell = 0; cell < s; cell++)
+            for (count i = 0; i < m; i++) {
+                sides[n++] = -steps[axis][0][cell][i];
+                sides[n++] = steps[axis][t - 1][cell][i];
+            }
+    return middle(n, sides);
+}
+
+/* Logarithmic odds, up to what is the same for all kinds, of a step, as a share of the usual one:
+   light makes any step of some. */
+static inline double odds_of(double share, int kind, double deviation, double stray)
+{
+    double away = (share - (kind - SAME)) / deviation;
+    return logarithm(exponential(-away * away / 2) + stray);
+}
+
+/* Logarithmic odds of all kinds of a line between two cells, against what else may be there. */
+static void set_odds(count m, const double steps[m], double usual, double deviation, double stray,
+                     double weight, double odds[KINDS])
+{
+    static const double expected[KINDS] = {0.25, 0.5, 0.25};
+    double any = 0;
+    for (int kind = 0; kind < KINDS; kind++) {
+        odds[kind] = 0;
+        for (count i = 0; i < m; i++)
+            odds[kind] += weight * odds_of(steps[i] / usual, kind, deviation, stray);
+    }
+    for (int kind = 0; kind < KINDS; kind++)
+        any += expected[kind] * exponential(odds[kind] - odds[SAME]);
+    any = logarithm(any) + odds[SAME];
+    for (int kind = 0; kind < KINDS; kind++)
+        odds[kind] -= any;
+}
+
+/* Logarithmic odds of square corners, each in its own light: of ink in the middle of its cell, and of
+   the darker paper beyond its sides. */
+static double corners_odds(count h, count w, count s, const uint8_t gray[h][w],
+                           const double frame[3][3], double offset, const double corner[4],
+                           const double shown[2])
+{
+    double middle = 0.5 - 0.5 / (double)s, outermost = 0.5 - corner[0] / (double)s;
+    double outside = 0.5 + 0.5 / (double)s, odds = 0;
+    for (int i = 0; i < 4; i++) {
+        double x = i % 2 ? 1 : -1, y = i / 2 ? 1 : -1;
+        double across = sampled(h, w, gray, frame, x * outside, y * middle);
+        double down = sampled(h, w, gray, frame, x * middle, y * outside);
+        double ink = logarithm(sampled(h, w, gray, frame, x * middle, y * middle) + offset);
+        double paper = logarithm(lesser(across, down) + offset);
+        double seen = logarithm(sampled(h, w, gray, frame, x * outermost, y * outermost) + offset);
+        if (paper > ink)
+            odds += bounded(corner_odds(seen, (ink + paper) / 2, paper - ink, shown, corner[2]),
+                            corner[3]);
+    }
+    return odds;
+}
+
+void step_evidence(count h, count w, rows k, count s, count t, count n, count f, count m,
+                   const uint8_t gray[h][w], const double frames[k][3][3],
+                   const double sizes[k][2], const double places[m], double aside, double offset, double least,
+                   double deviation, double stray, double weight, double of_border,
+                   const double corner[4], bool seen[k],
+                   float features[k][f], double odds[3][k], double steps[2][t][s][m],
+                   double sides[4][s][m])
+{
+    count border = (s - n) / 2;
+    for (count i = 0; i < k; i++) {
+        double ink = 0, around = 0, shown[2];
+        memset(features[i], 0, sizeof features[i]);
+        set_steps(h, w, t, s, m, gray, frames[i], places, aside, offset, steps);
+        double usual = step_of_sides(t, s, m, steps, sides[0][0]);
+        seen[i] = usual > least;
+        for (int axis = 0; axis < 2 && seen[i]; axis++)
+            for (count line = 0; line < t; line++)
+                for (count cell = 0; cell < s; cell++) {
+                    double of[KINDS];
+                    const double *own = steps[axis][line][cell];
+                    set_odds(m, own, usual, deviation, stray, weight, of);
+                    int outer = line == 0 ? FALLING : line == t - 1 ? RISING : SAME;
+                    count column = line - border, row = cell - border;
+                    if (row >= 0 && row < n && column >= 0 && column <= n) {
+                        count at = 2 * (((count)axis * (n + 1) + column) * n + row);
+                        ink += of[SAME];
+                        for (int rises = 0; rises < 2 && at + rises < f; rises++)
+                            features[i][at + rises] =
+                                (float)(of[rises ? RISING : FALLING] - of[SAME]);
+                        continue;
+                    }
+                    around += of[outer];
+                }
+        odds[INK][i] = ink + of_border * around;
+        for (int axis = 0; axis < 2; axis++)
+            shown[axis] = normal_share(corner[0] * sizes[i][axis] / corner[1]);
+        odds[SQUARE][i] =
+            corners_odds(h, w, s, gray, frames[i], offset, corner, shown);
+        odds[AROUND][i] = around;
+    }
+}
