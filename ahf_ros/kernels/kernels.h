@@ -297,7 +297,7 @@ void outline_sizes(count n, count k, const int32_t points[n][2], const int64_t e
    their pixels are so far away from a line, by the root of the mean square, at the most. */
 void straight_edges(count h, count w, count m, count e, const uint8_t marked[h][w],
                     const int16_t across[h][w], const int16_t down[h][w], double cosine,
-                    double least, double away, double edges[m][4], int64_t found[1],
+                    double strict, double least, double away, double edges[m][4], int64_t found[1],
                     int32_t taken[e], uint8_t left[h][w]);
 /* Quadrilaterals that edges enclose, with what is dark inside, clockwise in the image, and how many
    of them, of corners and of sides there are. Edges meet up to gaps, px and their lengths, beyond

@@ -37,6 +37,10 @@ static bool set_line(const struct sums *of, double bright_x, double bright_y, do
     return true;
 }
 
+/* Pixels to either side among which an edge goes on, and how far aside of it, px. */
+enum { REACH = 2 };
+#define ASIDE 1.5
+
 /* How far from a pixel its gradient is largest, px along the axis that it is nearer to: where the
    parabola through three of its sizes is. */
 static double steepest(count h, count w, const int16_t sizes[h][w], count row, count column,
@@ -69,12 +73,15 @@ static count grown(count h, count w, count e, const int16_t across[h][w], const 
             (double)(y - first / w) + (level ? away : 0));
         bright[0] += size > 0 ? gx / size : 0;
         bright[1] += size > 0 ? gy / size : 0;
-        double least = cosine * sqrt(bright[0] * bright[0] + bright[1] * bright[1]);
-        for (count v = y ? y - 1 : 0; v <= y + 1 && v < h; v++)
-            for (count u = x ? x - 1 : 0; u <= x + 1 && u < w; u++) {
+        double total = sqrt(bright[0] * bright[0] + bright[1] * bright[1]);
+        for (count v = y > REACH ? y - REACH : 0; v <= y + REACH && v < h; v++)
+            for (count u = x > REACH ? x - REACH : 0; u <= x + REACH && u < w; u++) {
+                if (n >= e || !left[v][u])
+                    continue;
                 double a = across[v][u], d = down[v][u];
-                bool like = a * bright[0] + d * bright[1] >= least * sqrt(a * a + d * d);
-                if (n >= e || !left[v][u] || !like)
+                double aside = (double)(u - x) * bright[0] + (double)(v - y) * bright[1];
+                if (!(a * bright[0] + d * bright[1] >= cosine * total * sqrt(a * a + d * d)) ||
+                    fabs(aside) > ASIDE * total)
                     continue;
                 taken[n++] = (int32_t)(v * w + u);
                 left[v][u] = 0;
@@ -86,7 +93,7 @@ static count grown(count h, count w, count e, const int16_t across[h][w], const 
 /* What is left are corners, curves and single pixels. */
 void straight_edges(count h, count w, count m, count e, const uint8_t marked[h][w],
                     const int16_t across[h][w], const int16_t down[h][w], double cosine,
-                    double least, double away, double edges[m][4], int64_t found[1],
+                    double strict, double least, double away, double edges[m][4], int64_t found[1],
                     int32_t taken[e], uint8_t left[h][w])
 {
     count k = 0;
@@ -95,10 +102,21 @@ void straight_edges(count h, count w, count m, count e, const uint8_t marked[h][
         count column = first % w, row = first / w;
         if (!left[row][column])
             continue;
-        double bright[2] = {0, 0}, point[2], along[2], low = HUGE_VAL, high = -HUGE_VAL;
-        struct sums of = {0};
-        count n = grown(h, w, e, across, down, cosine, first, left, taken, &of, bright);
-        if ((double)n < least || !set_line(&of, bright[0], bright[1], away, point, along))
+        double point[2], along[2], low = HUGE_VAL, high = -HUGE_VAL;
+        bool straight = false;
+        count n = 0;
+        for (int tries = 0; tries < 2 && !straight; tries++) {
+            double bright[2] = {0, 0};
+            struct sums of = {0};
+            for (count i = 0; i < n; i++) /* two edges at a small angle: one of them */
+                left[taken[i] / w][taken[i] % w] = 1;
+            n = grown(h, w, e, across, down, tries ? strict : cosine, first, left, taken, &of,
+                      bright);
+            if ((double)n < least)
+                break;
+            straight = set_line(&of, bright[0], bright[1], away, point, along);
+        }
+        if (!straight)
             continue;
         for (count next = 0; next < n; next++) {
             double x = (double)(taken[next] % w - column), y = (double)(taken[next] / w - row);

@@ -10,7 +10,8 @@ import pytest
 
 from ahf_ros import kernels
 
-COSINE, LEAST, AWAY = 0.94, 4.0, 0.7
+COSINE, STRICT, LEAST, AWAY = 0.94, 0.985, 4.0, 0.5
+REACH, ASIDE = 2, 1.5
 SIDE, GAPS, OVERLAP, TURN, APART = 20.0, np.array([9.0, 0.8, 40.0]), 3.0, 0.3, 0.5
 RULES = np.array([0.98, 1.5, 0.03, 0.3, 8.0])
 MOST = 12
@@ -42,9 +43,9 @@ def plain_edges(
         size = math.hypot(across[y, x], down[y, x])
         return np.array([across[y, x], down[y, x]]) / size
 
-    for first in sorted(left):
-        if first not in left:
-            continue
+    def grown(
+        first: tuple[int, int], cosine: float
+    ) -> tuple[list[tuple[int, int]], np.ndarray, np.ndarray]:
         left.remove(first)
         some, bright, places = [first], np.zeros(2), []
         for y, x in some:
@@ -57,16 +58,34 @@ def plain_edges(
             away = np.clip((behind - before) / (2 * bent), -0.5, 0.5) if bent > 0 else 0.0
             places.append((x + away * step[1], y + away * step[0]))
             bright = bright + direction(y, x)
-            for v, u in product(range(y - 1, y + 2), range(x - 1, x + 2)):
-                alike = (v, u) in left and (
-                    direction(v, u) @ bright >= COSINE * np.linalg.norm(bright)
+            mean = bright / np.linalg.norm(bright)
+            beside = range(-REACH, REACH + 1)
+            for v, u in product(beside, beside):
+                alike = (
+                    (y + v, x + u) in left
+                    and direction(y + v, x + u) @ mean >= cosine
+                    and abs(u * mean[0] + v * mean[1]) <= ASIDE
                 )
                 if alike:
-                    left.remove((v, u))
-                    some.append((v, u))
-        points = np.array(places)
-        values, vectors = np.linalg.eigh(np.cov(points.T, bias=True)) if len(some) > 1 else (0, 0)
-        if len(some) < LEAST or values[0] >= AWAY**2:
+                    left.remove((y + v, x + u))
+                    some.append((y + v, x + u))
+        return some, bright, np.array(places)
+
+    for first in sorted(left):
+        if first not in left:
+            continue
+        straight = False
+        for cosine in (COSINE, STRICT):
+            some, bright, points = grown(first, cosine)
+            if len(some) < LEAST:
+                break
+            values, vectors = np.linalg.eigh(np.cov(points.T, bias=True))
+            straight = values[0] < AWAY**2
+            if straight:
+                break
+            if cosine == COSINE:
+                left.update(some)
+        if not straight:
             continue
         along = vectors[:, 1]
         if along[1] * bright[0] - along[0] * bright[1] < 0:
@@ -82,7 +101,7 @@ def plain_edges(
 def test_straight_edges(seed: int) -> None:
     of_picture = picture(seed)
     count = cv2.countNonZero(of_picture[0])
-    of_pixels = *of_picture, COSINE, LEAST, AWAY
+    of_pixels = *of_picture, COSINE, STRICT, LEAST, AWAY
     edges, found, *_ = kernels.straight_edges(*of_pixels, m=count, e=count)
     expected = np.array([*plain_edges(*of_picture)]).reshape(-1, 4)
     assert found == len(expected) > 0

@@ -80,9 +80,12 @@ def _weights(every: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _normalised(inks: np.ndarray, every: int) -> np.ndarray:
-    """Return weighted inks less straight lines, with squares of a sum of 1, float32."""
+    """Return weighted inks less straight lines, with squares of a sum of 1, float32.
+
+    Those that are clipped to one gray value explain nothing, whatever rounding leaves of them.
+    """
     inks = less_lines(inks, every)
-    return inks / np.linalg.norm(inks, axis=1, keepdims=True)
+    return inks / np.sqrt(totals(inks))[:, None]
 
 
 @lru_cache(maxsize=256)

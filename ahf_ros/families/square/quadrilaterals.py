@@ -16,9 +16,9 @@ from ahf_ros.vision.log_edges import find_marked
 from ahf_ros.vision.pyramid import log_image
 
 _CONTRAST = 2.0  # times that of the image: edges down to a step of a thirteenth
-_ALIKE = 0.94  # cosine between the gradient of a pixel and that of its edge
+_ALIKE = 0.94, 0.985  # cosine between the gradients of a pixel and its edge; where this is bent
 _SHORTEST = 3.0  # edge, px
-_STRAIGHT = 0.7  # root of the mean square of the distances of its pixels from a line, px
+_STRAIGHT = 0.4  # root of the mean square of the distances of its pixels from a line, px
 _GAPS = np.array([10.0, 1.3, 60.0])  # to a corner: px, lengths of an edge; to the next edge, px
 _OVERLAP = 3.0  # of an edge beyond a corner, where blur makes it round, px
 _TURN = 0.3  # sine of the angle of a corner
@@ -61,7 +61,7 @@ def straight_edges(gray: np.ndarray) -> np.ndarray:
     marked, across, down = find_marked(log_image(gray), _CONTRAST)
     of_pixels, count = (marked, across, down), cv2.countNonZero(marked)
     edges, found, *_ = kernels.straight_edges(
-        *of_pixels, _ALIKE, _SHORTEST, _STRAIGHT, m=int(count / _SHORTEST), e=count
+        *of_pixels, *_ALIKE, _SHORTEST, _STRAIGHT, m=int(count / _SHORTEST), e=count
     )
     edges = edges[: found[0]]
     along = edges[:, 2:] - edges[:, :2]
