@@ -128,8 +128,9 @@ def _seen(
     """Yield what quadrilaterals say within a border, with what the features of words are."""
     steps, even = steps_between_cells(gray, frames, corners, cells, border)
     which = np.flatnonzero(even)
-    levels = levels_of_cells(gray, frames[which], corners[which], sizes[which], cells, border)
-    yield replace(levels, quadrilateral=which[levels.quadrilateral]), _as_they_are
+    if len(which):
+        levels = levels_of_cells(gray, frames[which], corners[which], sizes[which], cells, border)
+        yield replace(levels, quadrilateral=which[levels.quadrilateral]), _as_they_are
     yield steps, stepped
 
 
