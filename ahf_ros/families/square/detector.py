@@ -107,7 +107,7 @@ class SquareDetector(ExpectingDetector):
         expected, everything = self.expected, self.settings.report_undecoded
         found = [NOTHING]
         for level, half in enumerate(halved(gray, levels)):
-            corners = find_quadrilaterals(half)
+            corners = find_quadrilaterals(half, small=not level)
             if level:  # where light, a lens or enlargement spreads edges
                 corners = corners[~_are_read(_enlarged(corners, level), Readings.joined(found))]
             small = np.linalg.norm(corners[:, 2] - corners[:, 0], axis=1) < _SMALL

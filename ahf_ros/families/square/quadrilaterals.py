@@ -18,7 +18,7 @@ from ahf_ros.vision.pyramid import log_image
 _CONTRAST = 2.0  # times that of the image: edges down to a step of a thirteenth
 _ALIKE = 0.94, 0.985  # cosine between the gradients of a pixel and its edge; where this is bent
 _SHORTEST = 3.0  # edge, px
-_STRAIGHT = 0.4  # root of the mean square of the distances of its pixels from a line, px
+_STRAIGHT = 0.5  # root of the mean square of the distances of its pixels from a line, px
 _GAPS = np.array([10.0, 1.3, 60.0])  # to a corner: px, lengths of an edge; to the next edge, px
 _OVERLAP = 3.0  # of an edge beyond a corner, where blur makes it round, px
 _TURN = 0.3  # sine of the angle of a corner
@@ -29,14 +29,25 @@ _SMALLEST = 7.0  # side, px
 _APART = 0.5  # corners of different quadrilaterals, px
 _MOST = 8, 24, 4  # corners, sides and quadrilaterals for an edge, three times what is usual
 _OUTWARDS = 0.3  # from where the logarithm is steepest to where light is half of the step, px
+_SMALL_IMAGE = 500_000  # pixels
 _CELL = 32.0  # of the grid in which edges are looked for, px
 
 
-def find_quadrilaterals(gray: np.ndarray) -> np.ndarray:
+def find_quadrilaterals(gray: np.ndarray, *, small: bool = False) -> np.ndarray:
     """Return the corners of dark quadrilaterals in an image of uint8, px, shape (k, 4, 2).
 
-    They are clockwise in the image, and known to about half a pixel.
+    They are clockwise in the image, and known to about half a pixel. Those of `small` markers are
+    looked for in twice the size as well, if the image is not large.
     """
+    found = _enclosed(gray)
+    if not small or gray.size > _SMALL_IMAGE:
+        return found
+    larger = cv2.resize(gray, None, fx=2, fy=2, interpolation=cv2.INTER_CUBIC)
+    return np.concatenate([found, (_enclosed(larger) + 0.5) / 2 - 0.5])
+
+
+def _enclosed(gray: np.ndarray) -> np.ndarray:
+    """Return the corners of what the straight edges of an image enclose, shape (k, 4, 2)."""
     edges = straight_edges(gray)
     wide, tall = (int(side // _CELL) + 1 for side in gray.shape[::-1])
     rules = np.array([_SAME_WAY, _OFFSET, _BENT, _SEEN, _SMALLEST])

@@ -29,6 +29,7 @@ _MINIMUM_STEP = 0.35  # from ink to paper, in the logarithm
 _DEVIATION = 0.25  # of steps of the print, in usual ones
 _STRAY = 0.08  # density of steps that light makes, in that of the likeliest ones
 _WEIGHT = 0.4  # of a step, as those beside it are much like it
+_SMALL_CELL, _BLURRED = 3.5, 16.0  # px, and logarithmic odds against what blur makes of these
 _ANY_LIGHT, _ANY_FIGURE = 5.0, 10.0  # logarithmic odds against a marker that only this shows
 _EVEN = 0.8  # mean evidence of the lines about a border, from which levels are read, too
 
@@ -62,11 +63,12 @@ def steps_between_cells(
     )
     lines = 2 * (side * (side + 1) - cells * (cells + 1))
     which = np.flatnonzero(seen & (around > 0))
+    small = cell_sizes(corners[which], side).min(axis=1) < _SMALL_CELL
     found = Evidence(
         which,
         features[which],
-        ink[which] - _ANY_LIGHT,
-        square[which] - _ANY_FIGURE,
+        ink[which] - _ANY_LIGHT - _BLURRED * small,
+        square[which] - _ANY_FIGURE - _BLURRED * small,
         np.ones(len(which), bool),
     )
     return found, ~seen | (around > _EVEN * lines)
