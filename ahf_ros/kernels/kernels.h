@@ -292,17 +292,18 @@ void outline_sizes(count n, count k, const int32_t points[n][2], const int64_t e
 
 /* straight.c */
 
-/* Straight edges, by their ends, px, with what is bright on the left: of the pixels that are marked,
-   whose gradients are given. They are so long at the least, their gradients differ by an angle, and
-   their pixels are so far away from a line, by the root of the mean square, at the most. */
+/* Straight edges among marked pixels, by their ends, px, with what is bright on the left, and their
+   number. The gradients of an edge differ by an angle at the most: by a smaller one where its pixels
+   are not near to a line, by the root of their mean square distance. */
 void straight_edges(count h, count w, count m, count e, const uint8_t marked[h][w],
                     const int16_t across[h][w], const int16_t down[h][w], double cosine,
                     double strict, double least, double away, double edges[m][4], int64_t found[1],
                     int32_t taken[e], uint8_t left[h][w]);
-/* Quadrilaterals that edges enclose, with what is dark inside, clockwise in the image, and how many
-   of them, of corners and of sides there are. Edges meet up to gaps, px and their lengths, beyond
-   their ends, which are looked for within the third one; those of one side are straight up to an
-   offset, px, and by how much lines are bent, and are seen for a share of it. */
+/* Quadrilaterals that edges enclose, dark inside and clockwise in the image, and their number. Two
+   edges meet up to a gap beyond their ends, px, and so many of their lengths; the third gap is how far
+   an edge goes on. The rules say which edges are one side: the cosine of their angle, their distance
+   from one line, px and as a share of the distance between them, the share of the side that they show,
+   and how long it is, px. */
 void edge_quadrilaterals(count n, count tall, count wide, count c, count l, count q,
                          const double edges[n][4], double side, const double gaps[3],
                          double overlap, double turn, const double rules[5], double apart,
@@ -345,12 +346,12 @@ void cell_evidence(count h, count w, rows k, count s, count n, const uint8_t gra
 
 /* square_steps.c */
 
-/* By how much the log odds of markers of n by n cells grow where what is behind a line between two of
-   them is darker, or brighter: line by line, upright ones first. And those where all cells are ink,
-   those of square corners, and those of the border, of which a share is in the first. A grid has s by
-   s cells with the border and t = s + 1 lines either way. Steps of the logarithm are taken at m places
-   along a line, so far aside, in cells, and compared with the usual step of the sides, which is seen
-   where it is large enough. Light makes some steps, which any is one of by a small density. */
+/* By how much the log odds of markers of n by n cells grow where the cell behind a line is darker than
+   the one before it, and where it is brighter: line by line, upright lines first. Then the odds of a
+   marker whose cells are all ink, with a share of those of the border; of square corners; and of the
+   border. A grid has s by s cells, border included, and t = s + 1 lines either way. Steps of the
+   logarithm are taken at m places along a line, on either side of it, and compared with the usual step
+   across the sides, which must not be too small. Light makes steps of any height, at a low density. */
 void step_evidence(count h, count w, rows k, count s, count t, count n, count f, count m,
                    const uint8_t gray[h][w], const double frames[k][3][3],
                    const double sizes[k][2], const double places[m], double aside, double offset,
