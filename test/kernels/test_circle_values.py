@@ -4,19 +4,9 @@ import numpy as np
 import pytest
 
 from ahf_ros import kernels
+from support.plain_values import at
 
 LIFT = np.float32([0, 40, 80])
-
-
-def at(image: np.ndarray, x: float, y: float) -> float:
-    """Return the gray value between pixels, of the nearest one beyond the border."""
-    height, width = image.shape
-    x, y = min(max(x, 0), width - 1), min(max(y, 0), height - 1)
-    left, top = min(int(x), max(width - 2, 0)), min(int(y), max(height - 2, 0))
-    part = image[top : top + 2, left : left + 2].astype(float)
-    across, down = x - left, y - top
-    rows = [(1 - across) * row[0] + across * row[-1] for row in part]
-    return (1 - down) * rows[0] + down * rows[-1]
 
 
 @pytest.mark.parametrize('shape', [(1, 1), (1, 9), (7, 1), (30, 40)])

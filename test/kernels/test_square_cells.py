@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from ahf_ros import kernels
+from support.plain_values import below, value
 
 SEEDS, SHADED = range(6), range(6, 9)
 INSIDE, BORDER = 4, 1
@@ -15,21 +16,6 @@ OFFSET, MIXED, LEAST, USUAL, SHARE, EVERYWHERE = 4.0, 0.2, 0.35, 0.4, 0.6, 1e-6
 SHARPNESS, MOST, UNCLEAR, UNUSUAL = 12.0, 3.0, 1.5, 2.5
 WEIGHTS, CORNER = np.array([0.15, 0.3, 0.7]), 0.3
 WINDOW = np.exp(-((np.arange(SIDE + 2) / 2.0) ** 2) / 2)
-
-
-def below(away: float) -> float:
-    return (1 + math.erf(away / math.sqrt(2))) / 2
-
-
-def value(gray: np.ndarray, frame: np.ndarray, x: float, y: float) -> float:
-    """Return the gray value between pixels at a place of a frame."""
-    across, down, scale = frame @ [x, y, 1]
-    at = np.clip([across / scale, down / scale], 0, np.array(gray.shape[::-1]) - 1)
-    left, top = at.astype(int)
-    right, bottom = min(left + 1, gray.shape[1] - 1), min(top + 1, gray.shape[0] - 1)
-    by_x, by_y = at - [left, top]
-    rows = gray[[top, bottom]].astype(float)
-    return float((rows[:, left] + by_x * (rows[:, right] - rows[:, left])) @ [1 - by_y, by_y])
 
 
 def plainly(

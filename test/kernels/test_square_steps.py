@@ -7,23 +7,13 @@ import numpy as np
 import pytest
 
 from ahf_ros import kernels
+from support.plain_values import below, value
 
 INSIDE = 4
 PLACES = np.array([-0.3, 0.0, 0.25])
 ASIDE, OFFSET, LEAST, DEVIATION, STRAY, WEIGHT, OF_BORDER = 0.3, 2.0, 0.35, 0.25, 0.08, 0.4, 0.3
 CORNER = np.array([0.3, 0.7, 12.0, 3.0])
 FALLING, SAME, RISING = -1, 0, 1
-
-
-def value(gray: np.ndarray, frame: np.ndarray, x: float, y: float) -> float:
-    """Return the gray value between pixels at a place of a frame."""
-    across, down, scale = frame @ [x, y, 1]
-    at = np.clip([across / scale, down / scale], 0, np.array(gray.shape[::-1]) - 1)
-    left, top = at.astype(int)
-    right, bottom = min(left + 1, gray.shape[1] - 1), min(top + 1, gray.shape[0] - 1)
-    by_x, by_y = at - [left, top]
-    rows = gray[[top, bottom]].astype(float)
-    return float((rows[:, left] + by_x * (rows[:, right] - rows[:, left])) @ [1 - by_y, by_y])
 
 
 def shown(seed: int, border: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
@@ -86,7 +76,7 @@ def plainly(
         any_kind = math.log(sum(usually[kind] * math.exp(each[kind]) for kind in each))
         odds[line] = {kind: each[kind] - any_kind for kind in each}
     middle, outside, outermost = 0.5 - 0.5 / side, 0.5 + 0.5 / side, 0.5 - CORNER[0] / side
-    seen = [(1 + math.erf(CORNER[0] * of / CORNER[1] / math.sqrt(2))) / 2 for of in sizes]
+    seen = [below(CORNER[0] * of / CORNER[1]) for of in sizes]
     blurred, square = 1 - seen[0] * seen[1], 0.0
     for x, y in product((-1, 1), repeat=2):
         ink = log(x * middle, y * middle)

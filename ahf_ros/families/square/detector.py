@@ -31,9 +31,10 @@ from ahf_ros.vision.image import as_gray, check_image
 from ahf_ros.vision.logistic import probability
 from ahf_ros.vision.pyramid import halved
 
-# Of a centre from contours where nothing else can be fitted, in sides: on paper with waves of 0.5
-# to 3 px, 0.021 of 169 markers and 0.032 of 85, none beyond three of these. On flat and on bent
-# sheets, in any light, edges or print are fitted: of 2,133 markers none was left.
+# Of a centre where nothing else can be fitted, in sides. It was measured of contours, which
+# straight edges replace: on paper with waves of 0.5 to 3 px, 0.021 of 169 markers and 0.032 of
+# 85, none beyond three of these. On flat and on bent sheets, in any light, edges or print are
+# fitted: of 2,133 markers none was left.
 _DRAFT_DEVIATION = 0.028
 _SMALL = 45.0  # diagonal of a marker whose cells are not much larger than pixels, px
 _SMALLEST_HALF = 24  # smaller side of a half that markers are looked for in, px
@@ -46,7 +47,7 @@ _ALONE = 2.9  # ... one marker alone shows
 _OF_PLAIN = 4.5  # the most that a marker which letters look like shows, logarithmic odds
 _LARGER = 6.9  # logarithmic odds against a larger dictionary where most markers are of a smaller
 _PRINTED = 4.5  # size of a cell, px, below which a whole print tells more than edges do
-_LARGE = 120.0  # side of a marker whose contour gives its corners to about two pixels, px
+_LARGE = 120.0  # side of a marker whose straight edges give its corners to about two pixels, px
 
 Groups = tuple[tuple[str, ...], ...]
 """Dictionaries; those in a group begin with the same markers, the smallest first."""
@@ -79,7 +80,7 @@ class SquareDetector(ExpectingDetector):
 
     @one_blas_thread()
     def draft(self, image: np.ndarray) -> list[Target]:
-        """Identify the markers of one image, with the corners of contours, to about a pixel."""
+        """Identify the markers of one image, with the corners of straight edges, to a pixel."""
         check_image(image)
         gray = np.ascontiguousarray(as_gray(image).astype(np.uint8, copy=False))
         groups = self.design
@@ -112,7 +113,7 @@ class SquareDetector(ExpectingDetector):
                 corners = corners[~_are_read(_enlarged(corners, level), Readings.joined(found))]
             small = np.linalg.norm(corners[:, 2] - corners[:, 0], axis=1) < _SMALL
             outlines = lay_outlines(half, corners[small])
-            if level:  # contours may do as well
+            if level:  # straight edges may do as well
                 corners = np.concatenate([corners, outlines])
             else:
                 corners[small] = outlines
@@ -290,7 +291,7 @@ def _fitted(gray: np.ndarray, corners: np.ndarray, ink: np.ndarray) -> Places:
 def _from_halves(gray: np.ndarray, corners: np.ndarray, ink: np.ndarray) -> np.ndarray:
     """Return the corners, shape (k, 4, 2), of large markers as halves of the image show them.
 
-    The contour of a large marker gives its corners to a part of its side, not to two pixels.
+    Straight edges of a large marker give its corners to a part of its side, not to two pixels.
     """
     sides = side_lengths(corners).max(axis=1)
     levels = ceil(log2(max(sides.max() / _LARGE, 1.0)))

@@ -81,8 +81,8 @@ def lay_prints(
 def lay_outlines(gray: np.ndarray, corners: np.ndarray) -> np.ndarray:
     """Return the corners of quadrilaterals, shape (k, 4, 2), as the edges of dark borders show.
 
-    No cell inside is known yet. A contour, whose pixels are nearly as large as the border of a
-    small marker is wide, knows less. Quadrilaterals without a dark border stay as they are.
+    No cell inside is known yet. Straight edges, whose pixels are nearly as large as the border of
+    a small marker is wide, know less. Quadrilaterals without a dark border stay as they are.
     """
     corners = corners.copy()
     found = _laid(gray, corners, np.ones((len(corners), 1, 1), bool), _OF_OUTLINE, _CELLS)

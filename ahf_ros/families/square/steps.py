@@ -43,10 +43,11 @@ def steps_between_cells(
     it is brighter, line by line, upright ones first; see `stepped`.
     """
     side = cells + 2 * border
+    sizes = cell_sizes(corners, side)
     seen, features, (ink, square, around), *_ = kernels.step_evidence(
         gray,
         frames,
-        cell_sizes(corners, side),
+        sizes,
         _ALONG,
         _ASIDE,
         _OFFSET,
@@ -63,7 +64,7 @@ def steps_between_cells(
     )
     lines = 2 * (side * (side + 1) - cells * (cells + 1))
     which = np.flatnonzero(seen & (around > 0))
-    small = cell_sizes(corners[which], side).min(axis=1) < _SMALL_CELL
+    small = sizes[which].min(axis=1) < _SMALL_CELL
     found = Evidence(
         which,
         features[which],
