@@ -349,14 +349,17 @@ void cell_evidence(count h, count w, rows k, count s, count n, const uint8_t gra
 /* By how much the log odds of markers of n by n cells grow where the cell behind a line is darker than
    the one before it, and where it is brighter: line by line, upright lines first. Then the odds of a
    marker whose cells are all ink, with a share of those of the border; of square corners; and of the
-   border. A grid has s by s cells, border included, and t = s + 1 lines either way. Steps of the
-   logarithm are taken at m places along a line, on either side of it, and compared with the usual step
-   across the sides, which must not be too small. Light makes steps of any height, at a low density. */
+   border. A grid has s by s cells, border included, t = s + 1 lines either way, and c = s + 2 cells with
+   those around it. Steps of the logarithm are taken at m places along a line, on either side of it,
+   without what blur mixes in from other cells, and compared with the usual step across the sides, which
+   must not be too small. Their deviation grows by the second of two numbers, times the share that blur
+   mixes in. Light makes steps of any height, at a low density. */
 void step_evidence(count h, count w, rows k, count s, count t, count n, count f, count m,
-                   const uint8_t gray[h][w], const double frames[k][3][3],
+                   count c, const uint8_t gray[h][w], const double frames[k][3][3],
                    const double sizes[k][2], const double places[m], double aside, double offset,
-                   double least, double deviation, double stray, double weight, double of_border,
-                   const double corner[4], bool seen[k], float features[k][f], double odds[3][k],
+                   double least, const double deviation[2], double stray, double weight,
+                   double of_border, const double corner[4], bool seen[k], float features[k][f],
+                   double odds[3][k], double scale[c], double light[2][c][c],
                    double steps[2][t][s][m], double sides[4][s][m]);
 
 /* square_words.c */

@@ -23,6 +23,34 @@ static inline double bounded(double odds, double most)
     return lesser(greater(odds, -most), most);
 }
 
+/* Take from values in rows what blur mixed into each row from the one before it and from the one
+   behind it, by elimination. */
+static inline void unmix(count n, double before, double behind, double values[n][n],
+                         double scale[n])
+{
+    for (count row = 0; row < n; row++) {
+        double from = row ? before : 0, own = 1 - from - (row < n - 1 ? behind : 0);
+        scale[row] = row ? 1 / (own - from * behind * scale[row - 1]) : 1 / own;
+        for (count column = 0; column < n; column++) {
+            double mixed = row ? from * values[row - 1][column] : 0;
+            values[row][column] = (values[row][column] - mixed) * scale[row];
+        }
+    }
+    for (count row = n - 2; row >= 0; row--)
+        for (count column = 0; column < n; column++)
+            values[row][column] -= behind * scale[row] * values[row + 1][column];
+}
+
+static inline void transpose(count n, double values[n][n])
+{
+    for (count row = 0; row < n; row++)
+        for (count column = 0; column < row; column++) {
+            double swapped = values[row][column];
+            values[row][column] = values[column][row];
+            values[column][row] = swapped;
+        }
+}
+
 /* Logarithmic odds of a square corner: its outermost part is as bright as paper if it is round. */
 static inline double corner_odds(double outermost, double half, double step, const double shown[2],
                           double sharpness)

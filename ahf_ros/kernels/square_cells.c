@@ -34,33 +34,6 @@ void dark_inside(count h, count w, rows k, count n, const uint8_t gray[h][w],
     }
 }
 
-/* Take from the lines of a square what blur mixed into each from its neighbours, by elimination. */
-static void unmix(count n, double share, double values[n][n], double scale[n])
-{
-    for (count row = 0; row < n; row++) {
-        bool end = row == 0 || row == n - 1;
-        double own = end ? 1 - share : 1 - 2 * share;
-        scale[row] = row ? 1 / (own - share * share * scale[row - 1]) : 1 / own;
-        for (count column = 0; column < n; column++) {
-            double before = row ? share * values[row - 1][column] : 0;
-            values[row][column] = (values[row][column] - before) * scale[row];
-        }
-    }
-    for (count row = n - 2; row >= 0; row--)
-        for (count column = 0; column < n; column++)
-            values[row][column] -= share * scale[row] * values[row + 1][column];
-}
-
-static void transpose(count n, double values[n][n])
-{
-    for (count row = 0; row < n; row++)
-        for (count column = 0; column < row; column++) {
-            double swapped = values[row][column];
-            values[row][column] = values[column][row];
-            values[column][row] = swapped;
-        }
-}
-
 /* Cells as a whole, without what blur mixes into each: by the mean of their parts in the first
    plane, and by the darkest of these and of their middle in the last one; parts between. */
 static void set_cells(count h, count w, count s, const uint8_t gray[h][w],
@@ -83,9 +56,9 @@ static void set_cells(count h, count w, count s, const uint8_t gray[h][w],
             levels[DARKEST][row][column] = least;
         }
     for (int plane = MEAN; plane < PLANES; plane += DARKEST - MEAN) {
-        unmix(s, shares[1], levels[plane], scale);
+        unmix(s, shares[1], shares[1], levels[plane], scale);
         transpose(s, levels[plane]);
-        unmix(s, shares[0], levels[plane], scale);
+        unmix(s, shares[0], shares[0], levels[plane], scale);
         transpose(s, levels[plane]);
     }
 }

@@ -9,28 +9,53 @@
 #include "square.h"
 
 enum { FALLING, SAME, RISING, KINDS };
-static double logarithm_at(count h, count w, const uint8_t gray[h][w], const double frame[3][3],
-                           const double place[2], int axis, double offset)
+
+#define NOTICED 1e-3 /* least share of other cells in the light of one that is taken out */
+
+/* Logarithms of the light of a grid's cells and of those around it, each in one place, in cells from
+   its middle: across lines, and along them. What blur, in cells, mixes in from other cells is taken
+   out. */
+static void set_light(count h, count w, count c, const uint8_t gray[h][w],
+                      const double frame[3][3], int axis, const double place[2],
+                      const double blur[2], double offset, double scale[c], double light[c][c])
 {
-    return logarithm(sampled(h, w, gray, frame, place[axis], place[1 - axis]) + offset);
+    double side = (double)(c - 2), middle = (double)(c - 1) / 2;
+    for (count line = 0; line < c; line++)
+        for (count cell = 0; cell < c; cell++) {
+            double at[2] = {((double)line - middle + place[0]) / side,
+                            ((double)cell - middle + place[1]) / side};
+            light[line][cell] = sampled(h, w, gray, frame, at[axis], at[1 - axis]);
+        }
+    for (int way = 0; way < 2; way++) {
+        double before = normal_share(-(0.5 + place[way]) / blur[way]);
+        double behind = normal_share(-(0.5 - place[way]) / blur[way]);
+        if (before + behind > NOTICED)
+            unmix(c, before, behind, light, scale);
+        transpose(c, light);
+    }
+    for (count i = 0; i < c * c; i++)
+        light[0][i] = logarithm(greater(light[0][i], 0) + offset);
 }
 
 /* Steps of the logarithm across the lines between the cells of a grid, upright lines first. */
-static void set_steps(count h, count w, count t, count s, count m, const uint8_t gray[h][w],
-                      const double frame[3][3], const double places[m], double aside,
-                      double offset, double steps[2][t][s][m])
+static void set_steps(count h, count w, count t, count s, count m, count c,
+                      const uint8_t gray[h][w], const double frame[3][3], const double places[m],
+                      double aside, double offset, const double blurs[2], double scale[c],
+                      double light[2][c][c], double steps[2][t][s][m])
 {
-    for (int axis = 0; axis < 2; axis++)
-        for (count line = 0; line < t; line++)
-            for (count cell = 0; cell < s; cell++)
-                for (count i = 0; i < m; i++) {
-                    double along = ((double)cell + 0.5 + places[i]) / (double)s - 0.5;
-                    double before[2] = {((double)line - aside) / (double)s - 0.5, along};
-                    double behind[2] = {((double)line + aside) / (double)s - 0.5, along};
+    for (int axis = 0; axis < 2; axis++) {
+        double blur[2] = {blurs[axis], blurs[1 - axis]};
+        for (count i = 0; i < m; i++) {
+            for (int behind = 0; behind < 2; behind++) {
+                double place[2] = {behind ? aside - 0.5 : 0.5 - aside, places[i]};
+                set_light(h, w, c, gray, frame, axis, place, blur, offset, scale, light[behind]);
+            }
+            for (count line = 0; line < t; line++)
+                for (count cell = 0; cell < s; cell++)
                     steps[axis][line][cell][i] =
-                        logarithm_at(h, w, gray, frame, behind, axis, offset) -
-                        logarithm_at(h, w, gray, frame, before, axis, offset);
-                }
+                        light[1][line + 1][cell + 1] - light[0][line][cell + 1];
+        }
+    }
 }
 
 /* The usual step across the sides of a grid, towards paper. */
@@ -96,26 +121,31 @@ static double corners_odds(count h, count w, count s, const uint8_t gray[h][w],
 }
 
 void step_evidence(count h, count w, rows k, count s, count t, count n, count f, count m,
-                   const uint8_t gray[h][w], const double frames[k][3][3],
-                   const double sizes[k][2], const double places[m], double aside, double offset, double least,
-                   double deviation, double stray, double weight, double of_border,
-                   const double corner[4], bool seen[k],
-                   float features[k][f], double odds[3][k], double steps[2][t][s][m],
-                   double sides[4][s][m])
+                   count c, const uint8_t gray[h][w], const double frames[k][3][3],
+                   const double sizes[k][2], const double places[m], double aside, double offset,
+                   double least, const double deviation[2], double stray, double weight,
+                   double of_border, const double corner[4], bool seen[k], float features[k][f],
+                   double odds[3][k], double scale[c], double light[2][c][c],
+                   double steps[2][t][s][m], double sides[4][s][m])
 {
     count border = (s - n) / 2;
     for (count i = 0; i < k; i++) {
-        double ink = 0, around = 0, shown[2];
+        double ink = 0, around = 0, shown[2], blurs[2];
+        for (int axis = 0; axis < 2; axis++)
+            blurs[axis] = corner[1] / sizes[i][axis];
         memset(features[i], 0, sizeof features[i]);
-        set_steps(h, w, t, s, m, gray, frames[i], places, aside, offset, steps);
+        set_steps(h, w, t, s, m, c, gray, frames[i], places, aside, offset, blurs, scale, light,
+                  steps);
         double usual = step_of_sides(t, s, m, steps, sides[0][0]);
         seen[i] = usual > least;
-        for (int axis = 0; axis < 2 && seen[i]; axis++)
+        for (int axis = 0; axis < 2 && seen[i]; axis++) {
+            double mixed = normal_share(-aside / blurs[axis]);
+            double usually_off = deviation[0] + deviation[1] * mixed;
             for (count line = 0; line < t; line++)
                 for (count cell = 0; cell < s; cell++) {
                     double of[KINDS];
                     const double *own = steps[axis][line][cell];
-                    set_odds(m, own, usual, deviation, stray, weight, of);
+                    set_odds(m, own, usual, usually_off, stray, weight, of);
                     int outer = line == 0 ? FALLING : line == t - 1 ? RISING : SAME;
                     count column = line - border, row = cell - border;
                     if (row >= 0 && row < n && column >= 0 && column <= n) {
@@ -128,11 +158,11 @@ void step_evidence(count h, count w, rows k, count s, count t, count n, count f,
                     }
                     around += of[outer];
                 }
+        }
         odds[INK][i] = ink + of_border * around;
         for (int axis = 0; axis < 2; axis++)
-            shown[axis] = normal_share(corner[0] * sizes[i][axis] / corner[1]);
-        odds[SQUARE][i] =
-            corners_odds(h, w, s, gray, frames[i], offset, corner, shown);
+            shown[axis] = normal_share(corner[0] / blurs[axis]);
+        odds[SQUARE][i] = corners_odds(h, w, s, gray, frames[i], offset, corner, shown);
         odds[AROUND][i] = around;
     }
 }

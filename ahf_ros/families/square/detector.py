@@ -46,6 +46,8 @@ _SEVERAL = 4.0  # power of their number, one in which each of several groups is 
 _ALONE = 2.9  # ... one marker alone shows
 _OF_PLAIN = 4.5  # the most that a marker which letters look like shows, logarithmic odds
 _LARGER = 6.9  # logarithmic odds against a larger dictionary where most markers are of a smaller
+_RESOLVED = 120.0  # side of a marker of which finer images show no more, px
+_LOST = 12.0  # logarithmic odds against a marker that only a half shows
 _PRINTED = 4.5  # size of a cell, px, below which a whole print tells more than edges do
 _LARGE = 120.0  # side of a marker whose straight edges give its corners to about two pixels, px
 
@@ -107,7 +109,8 @@ class SquareDetector(ExpectingDetector):
         levels = max(0, int(log2(max(min(gray.shape) / _SMALLEST_HALF, 1))))
         expected, everything = self.expected, self.settings.report_undecoded
         found = [NOTHING]
-        for level, half in enumerate(halved(gray, levels)):
+        halves = halved(gray, levels)
+        for level, half in enumerate(halves):
             corners = find_quadrilaterals(half, small=not level)
             if level:  # where light, a lens or enlargement spreads edges
                 corners = corners[~_are_read(_enlarged(corners, level), Readings.joined(found))]
@@ -118,7 +121,8 @@ class SquareDetector(ExpectingDetector):
             else:
                 corners[small] = outlines
             of_half = read(half, corners, groups, expected, everything=everything)
-            found.append(replace(of_half, corners=_enlarged(of_half.corners, level)))
+            of_half = replace(of_half, corners=_enlarged(of_half.corners, level))
+            found.append(self._compared(halves[: level + 1], of_half, groups))
         readings = Readings.joined(found)
         laid = read(gray, _laid(gray, readings, groups), groups, expected)
         readings = Readings.joined([readings, replace(laid, odds=laid.odds - _FITTED)])
@@ -129,6 +133,25 @@ class SquareDetector(ExpectingDetector):
         odds = np.concatenate([_odds_together(sure, groups), odds])
         readings = replace(Readings.joined([sure, doubtful]), odds=odds)
         return _of_usual_borders(readings)
+
+    def _compared(
+        self, halves: Sequence[np.ndarray], readings: Readings, groups: Groups
+    ) -> Readings:
+        """Return the readings of the last half, and what finer images show in their places.
+
+        Where details are lost, figures look like markers, so that a reading of a half alone is
+        doubted.
+        """
+        level = len(halves) - 1
+        sides = side_lengths(readings.corners).max(axis=1)
+        finest = np.ceil(np.log2(np.maximum(sides / _RESOLVED, 1)))
+        finer = (readings.odds > MINIMUM_ODDS) & (finest < level)
+        shown = [replace(readings, odds=readings.odds - _LOST * finer)]
+        for own in np.unique(finest[finer]).astype(int).tolist():
+            corners = reduced(readings.corners[finer & (finest == own)], own)
+            seen = read(halves[own], corners, groups, self.expected)
+            shown.append(replace(seen, corners=_enlarged(seen.corners, own)))
+        return Readings.joined(shown)
 
     @one_blas_thread()
     def refine(self, image: np.ndarray, targets: Sequence[Target]) -> list[Target]:

@@ -5,6 +5,9 @@ is. Edges of light make steps, too, of any height, but they lie along the lines 
 chance only. So steps across these lines are read by likelihood: a step up, a step down, or none,
 by a mixture of a normal distribution about each and of one that has steps of all heights. How high
 a step of the print is, the sides of the marker show.
+
+What blur mixes into the light of a cell from those beside it is taken out first, line by line. It
+is known for a usual image only, so that steps differ by more where it is much.
 """
 
 from __future__ import annotations
@@ -26,10 +29,10 @@ _ALONG = np.linspace(-0.32, 0.32, 5)  # where steps are taken, from the middle o
 _ASIDE = 0.3  # on either side of it, cells
 _OFFSET = 2.0  # added to gray values before the logarithm, about the noise of dark ones
 _MINIMUM_STEP = 0.35  # from ink to paper, in the logarithm
-_DEVIATION = 0.25  # of steps of the print, in usual ones
-_STRAY = 0.08  # density of steps that light makes, in that of the likeliest ones
+# Of steps of the print, in usual ones, and what blur adds where all light is of other cells.
+_DEVIATION = np.array([0.25, 0.5])
+_STRAY = 0.05  # density of steps that light makes, in that of the likeliest ones
 _WEIGHT = 0.4  # of a step, as those beside it are much like it
-_SMALL_CELL, _BLURRED = 3.5, 16.0  # px, and logarithmic odds against what blur makes of these
 _ANY_LIGHT, _ANY_FIGURE = 5.0, 10.0  # logarithmic odds against a marker that only this shows
 _EVEN = 0.8  # mean evidence of the lines about a border, from which levels are read, too
 
@@ -59,17 +62,17 @@ def steps_between_cells(
         np.array([CORNER, USUAL_BLUR, SHARPNESS, COVERED]),
         s=side,
         t=side + 1,
+        c=side + 2,
         n=cells,
         f=4 * cells * (cells + 1),
     )
     lines = 2 * (side * (side + 1) - cells * (cells + 1))
     which = np.flatnonzero(seen & (around > 0))
-    small = sizes[which].min(axis=1) < _SMALL_CELL
     found = Evidence(
         which,
         features[which],
-        ink[which] - _ANY_LIGHT - _BLURRED * small,
-        square[which] - _ANY_FIGURE - _BLURRED * small,
+        ink[which] - _ANY_LIGHT,
+        square[which] - _ANY_FIGURE,
         np.ones(len(which), bool),
     )
     return found, ~seen | (around > _EVEN * lines)
