@@ -33,8 +33,9 @@ static void set_light(count h, count w, count c, const uint8_t gray[h][w],
             unmix(c, before, behind, light, scale);
         transpose(c, light);
     }
-    for (count i = 0; i < c * c; i++)
-        light[0][i] = logarithm(greater(light[0][i], 0) + offset);
+    for (count line = 0; line < c; line++)
+        for (count cell = 0; cell < c; cell++)
+            light[line][cell] = logarithm(greater(light[line][cell], 0) + offset);
 }
 
 /* Steps of the logarithm across the lines between the cells of a grid, upright lines first. */
