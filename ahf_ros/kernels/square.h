@@ -51,6 +51,12 @@ static inline void transpose(count n, double values[n][n])
         }
 }
 
+static inline void set_logarithms(count n, double values[n], double offset)
+{
+    for (count i = 0; i < n; i++)
+        values[i] = logarithm(greater(values[i], 0) + offset);
+}
+
 /* Logarithmic odds of a square corner: its outermost part is as bright as paper if it is round. */
 static inline double corner_odds(double outermost, double half, double step, const double shown[2],
                           double sharpness)

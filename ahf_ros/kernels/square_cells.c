@@ -63,12 +63,6 @@ static void set_cells(count h, count w, count s, const uint8_t gray[h][w],
     }
 }
 
-static void set_logarithms(count n, double values[n], double offset)
-{
-    for (count i = 0; i < n; i++)
-        values[i] = logarithm(greater(values[i], 0) + offset);
-}
-
 /* Cells of the border, and of paper beside it. */
 struct pair {
     double ink, paper;

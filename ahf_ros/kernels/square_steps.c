@@ -33,9 +33,7 @@ static void set_light(count h, count w, count c, const uint8_t gray[h][w],
             unmix(c, before, behind, light, scale);
         transpose(c, light);
     }
-    for (count line = 0; line < c; line++)
-        for (count cell = 0; cell < c; cell++)
-            light[line][cell] = logarithm(greater(light[line][cell], 0) + offset);
+    set_logarithms(c * c, light[0], offset);
 }
 
 /* Steps of the logarithm across the lines between the cells of a grid, upright lines first. */
@@ -141,12 +139,12 @@ void step_evidence(count h, count w, rows k, count s, count t, count n, count f,
         seen[i] = usual > least;
         for (int axis = 0; axis < 2 && seen[i]; axis++) {
             double mixed = normal_share(-aside / blurs[axis]);
-            double usually_off = deviation[0] + deviation[1] * mixed;
+            double spread = deviation[0] + deviation[1] * mixed;
             for (count line = 0; line < t; line++)
                 for (count cell = 0; cell < s; cell++) {
                     double of[KINDS];
                     const double *own = steps[axis][line][cell];
-                    set_odds(m, own, usual, usually_off, stray, weight, of);
+                    set_odds(m, own, usual, spread, stray, weight, of);
                     int outer = line == 0 ? FALLING : line == t - 1 ? RISING : SAME;
                     count column = line - border, row = cell - border;
                     if (row >= 0 && row < n && column >= 0 && column <= n) {

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from ahf_ros import kernels
+from support.plain_values import below
 
 OFFSET, WHITE, LIGHT_EDGE, LEAST, MOST = 8.0, 250.0, 0.3, 0.05, 0.5
 SHARE, ANY, PLAIN, PAPER, INK, UNLIKELY = 0.12, 0.22, 0.35, 0.05, 0.12, 2.5
@@ -23,10 +24,6 @@ def density(x: float, deviation: float) -> float:
 
 def level(gray: float) -> float:
     return math.log(max(gray, 0) + OFFSET)
-
-
-def normal_share(x: float) -> float:
-    return math.erfc(-x / math.sqrt(2)) / 2
 
 
 @pytest.mark.parametrize('shares', [(), (0.25, 0.5, 0.75)])
@@ -76,7 +73,7 @@ def test_levels_are_compared_by_their_densities(seed: int, shares: tuple[float, 
                 if halves[half][j] and any(levels[b, it, a] >= glare[b] for it in ground[half]):
                     seen[j, a] = False
             known = float(spread[b, j, a]) if np.isfinite(spread[b, j, a]) else 1.0
-            part = [normal_share((it - RADII[j]) * size[b] / blur[b]) for it in edges[b]]
+            part = [below((it - RADII[j]) * size[b] / blur[b]) for it in edges[b]]
             share = 1.0 if RADII[j] < 1 else part[1] - part[0]
             paper, ink = float(light[b, j, a]), printed(j, a, share)
             of_noise = noise[b] / (here + OFFSET)

@@ -44,9 +44,14 @@ def shown(seed: int, border: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, n
     return np.rint(gray).astype(np.uint8), moved, sizes, ink
 
 
+def share_below(away: float) -> float:
+    """Return the share of a normal distribution below so many deviations, as kernels know it."""
+    return float(kernels.normal_shares(np.array([away]))[0])
+
+
 def unmixed(seen: np.ndarray, place: float, blur: float) -> np.ndarray:
     """Return rows without the shares that blur mixes into them from those beside them."""
-    before, behind = below((-0.5 - place) / blur), below((place - 0.5) / blur)
+    before, behind = (share_below((way * place - 0.5) / blur) for way in (-1, 1))
     if before + behind <= 1e-3:
         return seen
     beside = np.full(len(seen) - 1, before), np.full(len(seen) - 1, behind)
@@ -86,7 +91,7 @@ def plainly(
     usual = float(np.median(np.concatenate(sides)))
     odds = {}
     for line, of in steps.items():
-        deviation = DEVIATION @ [1, below(-ASIDE / blurs[line[0]])]
+        deviation = DEVIATION @ [1, share_below(-ASIDE / blurs[line[0]])]
         each = {
             kind: WEIGHT
             * np.log(np.exp(-(((of / usual - kind) / deviation) ** 2) / 2) + STRAY).sum()
@@ -148,6 +153,5 @@ def test_evidence_of_steps(seed: int, border: int) -> None:
             continue
         around += of[{0: FALLING, side: RISING}.get(line, SAME)]
     np.testing.assert_allclose(features[0], expected, atol=1e-4)
-    shares = [ink + OF_BORDER * around, square, around]
-    np.testing.assert_allclose(odds[:, 0], shares, atol=1e-5)  # blur is known to 1e-7
+    np.testing.assert_allclose(odds[:, 0], [ink + OF_BORDER * around, square, around], atol=1e-9)
     assert shows > 0  # of the cells that it has, under stripes five times as bright as others

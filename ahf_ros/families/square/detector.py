@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from math import ceil, inf, isnan, log, log2
+from math import inf, isnan, log, log2
 from typing import Any
 
 import numpy as np
@@ -46,10 +46,11 @@ _SEVERAL = 4.0  # power of their number, one in which each of several groups is 
 _ALONE = 2.9  # ... one marker alone shows
 _OF_PLAIN = 4.5  # the most that a marker which letters look like shows, logarithmic odds
 _LARGER = 6.9  # logarithmic odds against a larger dictionary where most markers are of a smaller
-_RESOLVED = 120.0  # side of a marker of which finer images show no more, px
 _LOST = 12.0  # logarithmic odds against a marker that only a half shows
 _PRINTED = 4.5  # size of a cell, px, below which a whole print tells more than edges do
-_LARGE = 120.0  # side of a marker whose straight edges give its corners to about two pixels, px
+# Side of a marker, px, of which finer images show no more, and whose straight edges give its
+# corners to about two pixels.
+_LARGE = 120.0
 
 Groups = tuple[tuple[str, ...], ...]
 """Dictionaries; those in a group begin with the same markers, the smallest first."""
@@ -143,11 +144,10 @@ class SquareDetector(ExpectingDetector):
         doubted.
         """
         level = len(halves) - 1
-        sides = side_lengths(readings.corners).max(axis=1)
-        finest = np.ceil(np.log2(np.maximum(sides / _RESOLVED, 1)))
+        finest = _halvings(readings.corners)
         finer = (readings.odds > MINIMUM_ODDS) & (finest < level)
         shown = [replace(readings, odds=readings.odds - _LOST * finer)]
-        for own in np.unique(finest[finer]).astype(int).tolist():
+        for own in np.unique(finest[finer]).tolist():
             corners = reduced(readings.corners[finer & (finest == own)], own)
             seen = read(halves[own], corners, groups, self.expected)
             shown.append(replace(seen, corners=_enlarged(seen.corners, own)))
@@ -214,6 +214,12 @@ def _are_read(places: np.ndarray, readings: Readings) -> np.ndarray:
     reach = _SAME_PLACE * side_lengths(places).max(axis=1)
     taken: np.ndarray = kernels.taken_places(places.mean(axis=1), reach, sure.mean(axis=1))
     return taken
+
+
+def _halvings(corners: np.ndarray) -> np.ndarray:
+    """Return how often the image is halved until markers are no larger than `_LARGE`, (k,)."""
+    sides = side_lengths(corners).max(axis=1)
+    return np.ceil(np.log2(np.maximum(sides / _LARGE, 1))).astype(int)
 
 
 def _laid(gray: np.ndarray, readings: Readings, groups: Groups) -> np.ndarray:
@@ -316,12 +322,12 @@ def _from_halves(gray: np.ndarray, corners: np.ndarray, ink: np.ndarray) -> np.n
 
     Straight edges of a large marker give its corners to a part of its side, not to two pixels.
     """
-    sides = side_lengths(corners).max(axis=1)
-    levels = ceil(log2(max(sides.max() / _LARGE, 1.0)))
+    halvings = _halvings(corners)
+    levels = int(halvings.max())
     corners = corners.astype(np.float64)
     halves = halved(gray, levels)
     for level in range(levels, 0, -1):
-        which = np.flatnonzero(sides > _LARGE * 2 ** (level - 1))
+        which = np.flatnonzero(halvings >= level)
         fit = fit_markers(halves[level], reduced(corners[which], level), ink[which])
         good = fit.share > 0
         corners[which[good]] = _enlarged(fit.corners[good], level)

@@ -46,11 +46,10 @@ def steps_between_cells(
     it is brighter, line by line, upright ones first; see `stepped`.
     """
     side = cells + 2 * border
-    sizes = cell_sizes(corners, side)
     seen, features, (ink, square, around), *_ = kernels.step_evidence(
         gray,
         frames,
-        sizes,
+        cell_sizes(corners, side),
         _ALONG,
         _ASIDE,
         _OFFSET,
