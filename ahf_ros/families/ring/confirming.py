@@ -3,7 +3,7 @@
 Their shapes are known better than the dots tell under a pattern of light, whose edges touch them.
 The dots tell where these shapes are now, and by how much edges have shifted, so that bands are
 read at once in the frames of the printed dots. What is not certain then is read as if nothing were
-known of it.
+known of it. Families that are not read were asked when a target was found, and not again.
 """
 
 from __future__ import annotations
@@ -22,7 +22,6 @@ from ahf_ros.families.ring.hypotheses import Hypotheses
 from ahf_ros.families.ring.known import Prior
 from ahf_ros.families.ring.proposals import measure_dots
 from ahf_ros.families.ring.reading import read_printed
-from ahf_ros.families.ring.rivals import against_rivals
 from ahf_ros.prints.ring import RingPrint
 from ahf_ros.vision import frame
 from ahf_ros.vision.circle_fit import ENOUGH, NO_FITS, Fit
@@ -55,10 +54,9 @@ def read_known(
         if not seen.any():
             continue
         first, which = first.select(seen), which[seen]
-        dots = measure_dots(gray, first, covariances=True)  # as a search has them
         printed = _printed(first, frames[seen])
         prior = Prior.after(expected, found.edge_shift[found.certain] / 2**octave.level)
-        read = _read(gray, printed, dots, names[which], families, prior)
+        read = _read(gray, printed, first, names[which], families, prior)
         read = at_full_size(pyramid.images[: octave.level + 1], read)
         found = Hypotheses.joined([found, read])
     return as_described(found, settings.codes(RingPrint))
@@ -85,11 +83,11 @@ def _read(
     for code in codes:
         own = np.flatnonzero(names == code.name)
         read = read_printed(gray, printed.select(own), code, prior)
-        read = against_rivals(gray, dots.select(own), read, [code], prior)
         rest[own[read.certain]] = False
         found.append(read.select(read.certain))
     if rest.any():
-        found.append(read_families(gray, dots.select(rest), codes, prior))
+        dots = measure_dots(gray, dots.select(rest), covariances=True)  # as a search has them
+        found.append(read_families(gray, dots, codes, prior))
     return Hypotheses.joined(found)
 
 
