@@ -233,22 +233,24 @@ static void step_odds(count m, count n, look of, const float shares[n], float re
                   at[MARKED_BAND], steps[TOLD], steps[ANYTHING], steps[MARK], steps[KNOWN], looks[s]);
 }
 
-/* Where something covers the ground beside either edge of a band, which is no shadow: marks in
-   shadow are darker than those in the light, and nothing that covers a target is. */
-static void covered_ground(count m, count n, look of, float shade, float light_edge,
+/* Where something covers the ground beside either edge of a band, which is no shadow and no light:
+   marks in shadow are darker than those in the light, and nothing that covers a target is. */
+static void covered_ground(count m, count n, look of, const target *it, float light_edge,
                            float marked_share, float read[2][READ][m], float looks[2][n][m],
                            float lit[2][m], bool covered[2][m])
 {
+    float shade = (float)it->shade;
     count every = 0, in_shadow = 0; /* and `lit`, ground as paper */
     for (int side = 0; side < 2; side++)
         for (count a = 0; a < m; a++) {
             float ground = read[side][GROUND][a], here = read[side][BAND][a];
             lit[side][a] = greater_f(ground, ground / (1 + read[side][MARKED][a] * (of.ink - 1)));
-            bool dim = read[side][COUNTS][a] > 0 && lit[side][a] <= shade;
+            bool dim = read[side][COUNTS][a] > 0 && is_covered(it, lit[side][a]);
             covered[side][a] = dim;
             every += dim;
+            float ink = printed(of, shade, 0, 1, here);
             in_shadow += dim && looks[side][n - 1][a] > looks[side][0][a] &&
-                         here < printed(of, shade, 0, 1, here);
+                         (it->polarity > 0 ? here < ink : here > ink);
         }
     bool shadow = (float)in_shadow > marked_share * (float)every;
     for (count a = 0; a < m; a++) {
@@ -294,8 +296,8 @@ void edge_evidence(rows k, count i, count c, count m, count n, const float gray[
             as_they_should(m, seen, steps[TOLD], steps[MARK], steps[SPREAD], steps[WIDTH],
                            typical[b][side][0], typical[b][side][1]);
         }
-        covered_ground(m, n, seen, (float)it.shade, (float)of.light_edge, (float)of.marked_share,
-                       read, looks[b], steps, covered[b]);
+        covered_ground(m, n, seen, &it, (float)of.light_edge, (float)of.marked_share, read, looks[b],
+                       steps, covered[b]);
     }
 }
 

@@ -137,12 +137,12 @@ void level_evidence(rows k, count d, count m, count n, const float levels[k][d][
         }
         for (int half = 0; half < 2; half++)
             for (count a = 0; a < m; a++) {
-                bool glare = false, dark = false;
+                bool glare = false, hidden = false;
                 for (count j = 0; j < d; j++) {
                     glare = glare || (ground[half][j] && levels[b][j][a] >= of.glare);
-                    dark = dark || (ground[half][j] && levels[b][j][a] <= (float)it.shade);
+                    hidden = hidden || (ground[half][j] && is_covered(&it, levels[b][j][a]));
                 }
-                covered[b][half][a] = dark;
+                covered[b][half][a] = hidden;
                 for (count j = 0; j < d && glare; j++)
                     if (ground[half][j] || in_band[half][j])
                         read[j][COUNTS][a] = 0;

@@ -46,6 +46,12 @@ static inline look look_of(const numbers *of, const target *it, float doubt)
                   .doubt = doubt, .at_ends = greater_f(doubt, (float)of->at_ends)};
 }
 
+/* Whether ground has another gray value than light leaves it: darker, or on dark ground brighter. */
+static inline bool is_covered(const target *it, float ground)
+{
+    return it->polarity > 0 ? ground <= (float)it->shade : ground >= (float)it->shade;
+}
+
 /* Share of ink at a distance from the edge that blur made of it, in deviations. */
 static inline double blurred(double distance)
 {

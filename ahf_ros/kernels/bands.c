@@ -192,36 +192,38 @@ static inline count angle_after(int64_t first, count i, count m)
 }
 
 /* Evidence for words with their best covers, from that for what they show. A cover has its `price`
-   and a `cost` at each angle; one that looks like paper has its own price, and its evidence at each
-   angle, on paper and on marks. */
+   and a `cost` at each angle, and an angle beside it `most` evidence; one that looks like paper has its
+   own price, and its evidence at each angle, on paper and on marks. */
 void covered_words(rows k, count w, count n, count m, const float looks[k][n][m],
                    const uint8_t steps[k][w][m], const int64_t first[k],
-                   const float on_paper[k][m], const float on_mark[k][m], float price,
-                   const float cost[k], const float paper_price[k], float scores[k][w])
+                   const float as_paper[2][k][m], float price, const float cost[k],
+                   const float paper_price[k], const float most[k][m], float scores[k][w])
 {
     enum { TOGETHER = 8 }; /* words, whose paths do not wait for each other */
     for (count b = 0; b < k; b++)
         for (count start = 0; start < w; start += TOGETHER) {
-            float clear[TOGETHER], covered[TOGETHER], like_paper[TOGETHER];
+            float clear[TOGETHER], beside[TOGETHER], covered[TOGETHER], like_paper[TOGETHER];
             float of_angle[TOGETHER], of_paper[TOGETHER];
             for (count j = 0; j < TOGETHER; j++) {
                 clear[j] = 0;
-                covered[j] = like_paper[j] = NEVER;
+                beside[j] = covered[j] = like_paper[j] = NEVER; /* no path begins under a cover */
             }
             for (count i = 0; i < m; i++) {
                 count a = angle_after(first[b], i, m);
                 for (count j = 0; j < TOGETHER; j++) {
                     count step = within(steps[b][within(start + j, w)][a], n);
                     of_angle[j] = looks[b][step][a];
-                    of_paper[j] = 2 * step > n - 1 ? on_mark[b][a] : on_paper[b][a];
+                    of_paper[j] = as_paper[2 * step > n - 1][b][a];
                 }
                 for (count j = 0; j < TOGETHER; j++) {
-                    float begun = i ? clear[j] : NEVER; /* no path begins under a cover */
-                    clear[j] = greater_f(greater_f(clear[j], covered[j]), like_paper[j]);
-                    clear[j] += of_angle[j];
-                    covered[j] = greater_f(covered[j], begun - price) - cost[b];
-                    like_paper[j] = greater_f(like_paper[j], begun - paper_price[b]);
-                    like_paper[j] += of_paper[j];
+                    float begun = i ? clear[j] - paper_price[b] : NEVER;
+                    float seen = greater_f(clear[j], like_paper[j]);
+                    like_paper[j] = greater_f(like_paper[j], begun) + of_paper[j];
+                    begun = beside[j] - price; /* after the angle before */
+                    float at_most = lesser_f(of_angle[j], most[b][a]);
+                    beside[j] = greater_f(seen, covered[j]) + at_most;
+                    clear[j] = greater_f(seen + of_angle[j], covered[j] + at_most);
+                    covered[j] = greater_f(covered[j], begun) - cost[b];
                 }
             }
             for (count j = 0; j < TOGETHER && start + j < w; j++)
@@ -233,8 +235,8 @@ void covered_words(rows k, count w, count n, count m, const float looks[k][n][m]
    has more evidence than the best one that is not. `until` is the evidence of the best paths to
    each angle on which the band is seen, covered, or covered by something like paper. */
 void hidden_angles(count k, count n, count m, const float looks[k][n][m],
-                   const uint8_t steps[k][m], const int64_t first[k], const float on_paper[k][m],
-                   const float on_mark[k][m], float price, const float cost[k],
+                   const uint8_t steps[k][m], const int64_t first[k],
+                   const float as_paper[2][k][m], float price, const float cost[k],
                    const float paper_price[k], bool hidden[k][m], float until[k][m][3])
 {
     for (count b = 0; b < k; b++) {
@@ -245,7 +247,7 @@ void hidden_angles(count k, count n, count m, const float looks[k][n][m],
             seen = greater_f(greater_f(seen, covered), like_paper) + looks[b][step][a];
             covered = greater_f(covered, begun - price) - cost[b];
             like_paper = greater_f(like_paper, begun - paper_price[b]);
-            like_paper += 2 * step > n - 1 ? on_mark[b][a] : on_paper[b][a];
+            like_paper += as_paper[2 * step > n - 1][b][a];
             until[b][i][0] = seen;
             until[b][i][1] = covered;
             until[b][i][2] = like_paper;
@@ -257,7 +259,7 @@ void hidden_angles(count k, count n, count m, const float looks[k][n][m],
                            until[b][i][0] + after_seen;
             seen = after_seen + looks[b][step][a];
             covered = after_covered - cost[b];
-            like_paper = after_paper + (2 * step > n - 1 ? on_mark[b][a] : on_paper[b][a]);
+            like_paper = after_paper + as_paper[2 * step > n - 1][b][a];
             after_covered = greater_f(seen, covered);
             after_paper = greater_f(seen, like_paper);
             after_seen = greater_f(covered - price, like_paper - paper_price[b]);

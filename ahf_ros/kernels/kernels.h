@@ -100,11 +100,11 @@ void word_steps(rows k, count w, count p, count n, count m, const int64_t words[
                 int64_t last, uint8_t steps[k][w][m]);
 void covered_words(rows k, count w, count n, count m, const float looks[k][n][m],
                    const uint8_t steps[k][w][m], const int64_t first[k],
-                   const float on_paper[k][m], const float on_mark[k][m], float price,
-                   const float cost[k], const float paper_price[k], float scores[k][w]);
+                   const float as_paper[2][k][m], float price, const float cost[k],
+                   const float paper_price[k], const float most[k][m], float scores[k][w]);
 void hidden_angles(count k, count n, count m, const float looks[k][n][m],
-                   const uint8_t steps[k][m], const int64_t first[k], const float on_paper[k][m],
-                   const float on_mark[k][m], float price, const float cost[k],
+                   const uint8_t steps[k][m], const int64_t first[k],
+                   const float as_paper[2][k][m], float price, const float cost[k],
                    const float paper_price[k], bool hidden[k][m], float until[k][m][3]);
 void free_arcs(count k, count n, count m, const float looks[k][n][m], const int64_t first[k],
                const float border[k], float price, const float cost[k], float scores[k],

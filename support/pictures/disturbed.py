@@ -9,8 +9,9 @@ import cv2
 import numpy as np
 
 from ahf_ros.base.target import TrueTarget
+from ahf_ros.prints import RING_NAMES
 from ahf_ros.prints.cyclic import smallest_rotation
-from ahf_ros.prints.ring import FAMILY_NAMES, RingPrint, family
+from ahf_ros.prints.ring import RingPrint, family
 from support.pictures import occluders
 from support.pictures.exposure import Exposure
 from support.pictures.sheets import COLUMNS, Sheet, random_numbers, target_sheet
@@ -147,7 +148,7 @@ def far_apart(code: RingPrint, sectors: int, seed: int) -> tuple[int, ...]:
         left = code.words[index] & ~np.array(windows)
         looks = set(smallest_rotation(left, code.bits).tolist())
         if not looks & seen:
-            chosen.append(index + 1)
+            chosen.append(int(code.numbers[index]))
             seen |= looks
     return tuple(sorted(chosen))
 
@@ -188,7 +189,7 @@ class Targets:
         sheets = self.sheets()
         for name, exposure in exposures().items():
             yield name, self._exposed(sheets, exposure)
-        for distance in (6.5, 5.5) if self.name in FAMILY_NAMES else ():
+        for distance in (6.5, 5.5) if self.name in RING_NAMES else ():
             row = f'another target {distance} dot radii away'
             yield row, self._overlapping(distance)
         yield 'mirrored', self._mirrored(sheets)

@@ -15,8 +15,9 @@ import cv2
 import numpy as np
 
 from ahf_ros.base.target import TrueTarget
+from ahf_ros.prints import RING_NAMES
 from ahf_ros.prints.prints import Cells
-from ahf_ros.prints.ring import FAMILY_NAMES, family
+from ahf_ros.prints.ring import family
 from ahf_ros.prints.square import CellPrint, dictionary
 from ahf_ros.scenes.covers import Cover, ink_cover
 from support.pictures.exposure import GAMMA, INK, WHITE, Cell, Exposure
@@ -162,7 +163,7 @@ class Sheet:
     def _samples(self, mark: Mark, corner: tuple[int, int]) -> Cell:
         x, y = _plane_samples(mark, corner, self.side)
         bits, inner, outer = 12, 2.25, 3.5
-        if self.name in FAMILY_NAMES:
+        if self.name in RING_NAMES:
             code = family(self.name)
             bits, inner, outer = code.bits, code.band_inner, code.band_outer
         width = 1 / _SAMPLES / self.radius
@@ -191,7 +192,7 @@ def target_sheet(
     """
 
     def ink(number: int) -> Ink:
-        if name in FAMILY_NAMES:
+        if name in RING_NAMES:
             code = family(name)
             return lambda turn: ink_cover(code.ink(code.word(number), _PINHOLE), turn)
         (cells,) = CellPrint(name).ink(number)
@@ -216,8 +217,8 @@ def random_numbers(
     """
     if among:
         every = np.array(among)
-    elif name in FAMILY_NAMES:
-        every = np.arange(1, family(name).words.size + 1)
+    elif name in RING_NAMES:
+        every = np.sort(family(name).numbers)
     else:
         every = np.arange(len(dictionary(name).bytesList))
         every = every[every > 0]  # a mark without a target has the number 0

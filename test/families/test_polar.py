@@ -15,10 +15,11 @@ BAND = (2.25, 3.5)
 ANGLES = 60
 
 
-def polar(image: np.ndarray) -> PolarImages:
+def polar(image: np.ndarray, polarity: int = 1, *, everything: bool = True) -> PolarImages:
     """Return the polar image of a dot of 12 px at (60, 60)."""
     gray = np.minimum(image, 255).astype(np.float32)
-    return polar_images(gray, measured(gray, [60.0], [60.0], 12.0), BAND, ANGLES)
+    dot = measured(gray, [60.0], [60.0], 12.0, polarity)
+    return polar_images(gray, dot, BAND, ANGLES, everything=everything)
 
 
 def usual_levels(image: np.ndarray) -> tuple[float, float]:
@@ -45,6 +46,15 @@ def test_what_is_dark_on_a_small_part_of_the_ground_covers_it() -> None:
     assert 160 < usual_levels(DOT)[0] < 175
     assert 160 < usual_levels(np.where(AWAY < 15, 0.5, 1.0) * DOT)[0] < 175
     assert usual_levels(np.where(X < 55, 0.5, 1.0) * DOT)[0] <= 0
+
+
+def test_what_is_bright_on_a_small_part_of_dark_ground_covers_it() -> None:
+    bright = np.where(np.hypot(X - 60, Y - 60) < 12, 180.0, 45.0)
+    covered, half = (np.where(of, 2.5, 1.0) * bright for of in (AWAY < 15, X < 55))
+    lit = bright + 40 * np.exp(-0.5 * (AWAY / 12) ** 2)
+    assert 46 < polar(covered, -1).shade[0] < 60
+    assert polar(covered, -1, everything=False).shade[0] == np.inf
+    assert [float(polar(it, -1).shade[0]) for it in (bright, half, lit)] == [np.inf] * 3
 
 
 def test_circles_are_read_between_two_others() -> None:

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from functools import cache, partial
+from itertools import product
 from typing import Any
 
 import cv2
@@ -325,17 +326,30 @@ COVERED = {
 """Disturbances, and how many of 18 targets are identified at least."""
 
 
+COVERED_BRIGHT = {
+    'white over 1 sector': (Exposure(occluder=occluders.over_sectors(1, 220)), 15),
+    'gray over 2 sectors': (Exposure(occluder=occluders.over_sectors(2, 170)), 5),
+    'gray finger': (Exposure(occluder=occluders.finger(2.0, 128)), 12),
+    'white spot': (Exposure(occluder=occluders.disc(1.0, 220)), 12),
+}
+"""The same of bright targets on dark ground."""
+
+
 @cache
-def whole_sheet() -> Sheet:
-    return target_sheet('metashape12', random_numbers('metashape12', 18, 31)[0], 31)
+def whole_sheet(*, bright: bool = False) -> Sheet:
+    numbers = random_numbers('metashape12', 18, 31)[0]
+    return target_sheet('metashape12', numbers, 31, bright=bright)
 
 
 @pytest.mark.lasting
-@pytest.mark.parametrize('sight', COVERED)
-def test_what_is_covered_costs_targets_and_gives_no_wrong_one(sight: str) -> None:
-    exposure, minimum = COVERED[sight]
-    targets = identified(whole_sheet().photograph(exposure))
-    figures = score(whole_sheet().truth, targets)
+@pytest.mark.parametrize(
+    ('sight', 'bright'), [*product(COVERED, [False]), *product(COVERED_BRIGHT, [True])]
+)
+def test_what_is_covered_costs_targets_and_gives_no_wrong_one(sight: str, bright: bool) -> None:
+    exposure, minimum = (COVERED_BRIGHT if bright else COVERED)[sight]
+    sheet = whole_sheet(bright=bright)
+    targets = identified(sheet.photograph(exposure))
+    figures = score(sheet.truth, targets)
     assert len(targets) == figures.right >= minimum
 
 

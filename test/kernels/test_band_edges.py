@@ -189,9 +189,11 @@ class Band:
         def ink(by: float) -> float:
             return printed(shade, 0, 1, by, contrast, dark)
 
-        dim = {it: seen[it] and lit[it] <= shade for it in places}
+        sign = 1 if dark else -1
+        dim = {it: seen[it] and sign * lit[it] <= sign * shade for it in places}
         shadowed = sum(
-            dim[it] and ink_over_paper[it] > 0 and band[it] < ink(band[it]) for it in places
+            dim[it] and ink_over_paper[it] > 0 and sign * band[it] < sign * ink(band[it])
+            for it in places
         )
         if shadowed > LIMITS['marked'] * sum(dim.values()):
             dim = dict.fromkeys(places, False)

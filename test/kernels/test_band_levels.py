@@ -123,7 +123,8 @@ def test_levels_are_compared_by_their_densities(seed: int, shares: tuple[float, 
         assert dot[b] == pytest.approx(of_dot, abs=1e-3)
         assert looks[b] == pytest.approx(expected, abs=1e-3)
         for half, a in itertools.product((0, 1), range(ANGLES)):
-            assert covered[b, half, a] == any(levels[b, it, a] <= shade[b] for it in ground[half])
+            sign, on_ground = polarity[b], levels[b, ground[half], a]
+            assert covered[b, half, a] == any(sign * on_ground <= sign * shade[b])
 
 
 @pytest.mark.parametrize('value', [np.nan, np.inf, -np.inf])

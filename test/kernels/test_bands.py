@@ -23,8 +23,9 @@ def path_value(
     look: np.ndarray,
     steps: np.ndarray,
     first: int,
-    as_paper: tuple[np.ndarray, np.ndarray],
+    as_paper: np.ndarray,
     prices: tuple[float, float, float],
+    most: np.ndarray,
 ) -> float:
     """Return the evidence of a path of states from an angle on, -inf if it may not be taken."""
     price, cost, paper_price = prices
@@ -35,7 +36,8 @@ def path_value(
             return -np.inf
         begins = state != 'seen' and before == 'seen'
         if state == 'seen':
-            total += look[steps[a], a]
+            beside = 'covered' in (before, *path[i + 1 : i + 2])
+            total += min(look[steps[a], a], most[a] if beside else np.inf)
         elif state == 'covered':
             total -= cost + price * begins
         else:
@@ -49,28 +51,25 @@ def path_value(
 def test_covers_are_those_of_the_best_of_all_paths(seed: int) -> None:
     generator, drawn = numbers(seed)
     k, w, n, m = 2, 9, 1 + seed % 4, 1 + seed % 6
-    looks, on_paper, on_mark = drawn(k, n, m), drawn(k, m), drawn(k, m)
+    looks, as_paper, most = drawn(k, n, m), drawn(2, k, m), drawn(k, m)
     steps = generator.integers(0, n, (k, w, m)).astype(np.uint8)
     first = generator.integers(0, m, k)
     price, cost, paper_price = 1.5, np.abs(drawn(k)), np.abs(drawn(k))
-    of_paths = on_paper, on_mark, price, cost, paper_price
-    scores = kernels.covered_words(looks, steps, first, *of_paths)
+    of_paths = as_paper, price, cost, paper_price
+    whole = np.full((k, m), np.inf, np.float32)
+    every = [kernels.covered_words(looks, steps, first, *of_paths, of) for of in (most, whole)]
     hidden, _ = kernels.hidden_angles(looks, steps[:, 0], first, *of_paths)
-    for b, word in itertools.product(range(k), range(w)):
+    for b, word, (scores, at_most) in itertools.product(
+        range(k), range(w), zip(every, (most, whole), strict=True)
+    ):
+        of_band = as_paper[:, b], (price, cost[b], paper_price[b]), at_most[b]
         values = {
-            path: path_value(
-                path,
-                looks[b],
-                steps[b, word],
-                first[b],
-                (on_paper[b], on_mark[b]),
-                (price, cost[b], paper_price[b]),
-            )
+            path: path_value(path, looks[b], steps[b, word], first[b], *of_band)
             for path in itertools.product(STATES, repeat=m)
         }
         best = max(values, key=lambda path: values[path])
         assert scores[b, word] == pytest.approx(values[best], abs=1e-4)
-        if word == 0:
+        if word == 0 and at_most is whole:
             expected = [best[(a - first[b]) % m] != 'seen' for a in range(m)]
             assert hidden[b].tolist() == expected
 
@@ -213,8 +212,8 @@ def test_no_value_leads_beyond_an_array(value: float) -> None:
     looks = np.full((2, 3, 6), value, np.float32)
     steps = np.full((2, 4, 6), 255, np.uint8)
     first, row = np.array([-9, 99]), np.full((2, 6), value, np.float32)
-    of_paths = row, row, value, row[:, 0], row[:, 0]
-    kernels.covered_words(looks, steps, first, *of_paths)
+    of_paths = np.stack([row, row]), value, row[:, 0], row[:, 0]
+    kernels.covered_words(looks, steps, first, *of_paths, row)
     kernels.hidden_angles(looks, steps[:, 0], first, *of_paths)
     kernels.free_arcs(looks, first, row[:, 0], value, row[:, 0])
     kernels.best_moves(looks, steps[:, 0], np.full((2, 6), -9), np.full((2, 6), 99))

@@ -150,7 +150,7 @@ def decode(
     bands = _Bands.of(evidence, of_bands, overhang, family)
     words, phases = _at_near_phases(words, phases)
     steps = bands.steps(words, phases)
-    scores = bands.scores(steps)
+    scores = bands.scores(steps, ends=draft)
     ids = canonical(words, family)[1]
     likely = scores + prior(words, family, expected)
     best = likely.argmax(axis=1)
@@ -164,7 +164,8 @@ def decode(
     other, of_other, coded, beside = word, score, *np.zeros((2, len(read)))
     if not draft:
         other = _as_it_looks(ones, pairs, phase, family)
-        of_other = bands.scores(bands.steps(other[:, None], phase[:, None]))[:, 0]
+        ways = np.stack([shown, bands.steps(other[:, None], phase[:, None])[:, 0]], axis=1)
+        score, of_other = bands.scores(ways).astype(np.float64).T
         border = _border(bands.some)
         of_arcs, borders = bands.arcs(border)
         price = _of_borders(inked, mixed, hidden, borders, border, family)
@@ -198,8 +199,7 @@ class _Bands:
     first: np.ndarray  # (k,)
     price: np.ndarray  # (k,), of the first reading of something that looks like paper, and...
     more: np.ndarray  # ... of each further one
-    on_paper: np.ndarray  # (k, m), evidence for it, less that: on paper, and...
-    on_mark: np.ndarray  # ... on a mark
+    as_paper: np.ndarray  # (2, k, m), evidence for it, less that: on paper, and on a mark
 
     @classmethod
     def of(cls, raw: Evidence, some: Evidence, overhang: np.ndarray, family: RingPrint) -> _Bands:
@@ -212,8 +212,8 @@ class _Bands:
             first=_clearest(some),
             price=price,
             more=more,
-            on_paper=some.paper - more[:, None],
-            on_mark=np.maximum(some.paper, _half_paper(raw)) - more[:, None],
+            as_paper=np.stack([some.paper, np.maximum(some.paper, _half_paper(raw))])
+            - more[:, None],
         )
 
     @property
@@ -231,12 +231,16 @@ class _Bands:
         sizes = {'n': self.family.bits, 'm': self.some.paper.shape[1]}
         return kernels.word_steps(words, phases, *self.ends, self.last, **sizes)
 
-    def scores(self, steps: np.ndarray, *, long: bool = False) -> np.ndarray:
+    def scores(self, steps: np.ndarray, *, long: bool = False, ends: bool = True) -> np.ndarray:
         """Return the evidence for words with their best covers, by their steps, (k, w).
 
-        Covers may be as `long` as arcs.
+        Covers may be as `long` as arcs. What the border of one makes of paper or ink looks like
+        the end of an arc: without `ends`, shares of ink between say no more beside covers.
         """
-        return kernels.covered_words(*self._paths(steps, long=long))
+        most = np.full(self.some.paper.shape, np.inf, np.float32)
+        if not ends:
+            most = np.maximum(np.maximum(self.some.paper, self.some.ink), 0)
+        return kernels.covered_words(*self._paths(steps, long=long), most)
 
     def hidden(self, steps: np.ndarray) -> np.ndarray:
         """Return where the best path of one word of each band is covered, (k, m) as its steps."""
@@ -262,11 +266,10 @@ class _Bands:
 
     def _paths(self, steps: np.ndarray, *, long: bool = False) -> tuple[Any, ...]:
         """Return what paths along words meet."""
-        some, on_paper, on_mark = self.some, self.on_paper, self.on_mark
+        some, as_paper = self.some, self.as_paper
         if long:
-            longer = np.float32(1 - _COVERED / _MORE) * self.more[:, None]
-            on_paper, on_mark = on_paper + longer, on_mark + longer
-        return some.looks, steps, self.first, on_paper, on_mark, COVER, self.cost, self.price
+            as_paper = as_paper + np.float32(1 - _COVERED / _MORE) * self.more[:, None]
+        return some.looks, steps, self.first, as_paper, COVER, self.cost, self.price
 
     def _moved(self, steps: np.ndarray) -> np.ndarray:
         """Return the steps of words whose bands are where they fit best beside their dots, (k, m).

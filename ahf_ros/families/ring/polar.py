@@ -50,7 +50,7 @@ _MINIMUM_LEVEL = 1.0  # gray value that ratios are taken of
 _NOISE = (1.2, 40.0)  # smallest and largest noise, gray values
 _EVEN = 0.015  # deviation of ln of ground in even light
 _UNLIKE = 4.0  # standard deviations of ground, from which a level is unlike the rest
-_LIGHT = 0.34  # share of the ground that is darker, or has edges, from which that is light
+_LIGHT = 0.34  # share of the ground that differs, or has edges, from which that is light
 _GLARE_EDGES = 0.03  # share of the ground, more than edges of glare have
 _WHITE_OUT = 0.6  # share of the ground that is saturated, from which that is no glare
 _ASIDE = 0.15  # least distance from the band at which its ground may end, dot radii
@@ -90,8 +90,8 @@ class PolarImages(ArrayRecord):
         Radius at which dark ground ends on white paper at an angle, dot radii; infinite where it
         does not.
     shade, glare : ndarray of float32, shape (k,)
-        Gray values of ground up to which something covers it, and from which glare lies on it;
-        infinite where white is paper.
+        Gray values of ground up to which something covers it, of dark ground from which on, and
+        from which glare lies on it; infinite where white is paper.
     """
 
     gray: np.ndarray
@@ -181,10 +181,13 @@ def polar_images(
     count: int,
     circles: int = CIRCLES,
     ratio: float = PRINTED,
+    *,
+    everything: bool = False,
 ) -> PolarImages:
     """Return the polar images of targets at some angles, see `angles_of`, on some circles.
 
-    Black is lifted to a `ratio` of ink and paper, see `black_lift`.
+    Black is lifted to a `ratio` of ink and paper, see `black_lift`. Bright spots of light lie
+    between others, which cover their ground only where `everything` may cover it.
     """
     inner, outer = band
     outermost = outer + _MARGIN
@@ -195,9 +198,9 @@ def polar_images(
     ground = values[:, [np.abs(radii - place).argmin() for place in places]]
     apart = 2 * np.pi * inner * dots.size / count
     noise = np.clip(reading_noise(gray, dots.frames, outermost), *_NOISE)
-    shade, glare = _usual_levels(ground, _later(ground, apart), noise)
-    # A camera that sharpens darkens dark ground beside bright marks; nothing there is darker.
-    shade = np.where(dots.polarity > 0, shade, np.float32(0))
+    shade, glare = _usual_levels(ground, _later(ground, apart), noise, dots.polarity)
+    if not everything:
+        shade = np.where(dots.polarity > 0, shade, np.float32(np.inf))
     return PolarImages(
         gray=values,
         row=np.arange(len(values)),
@@ -279,27 +282,30 @@ def _later(ground: np.ndarray, apart: np.ndarray) -> np.ndarray:
 
 
 def _usual_levels(
-    ground: np.ndarray, later: np.ndarray, noise: np.ndarray
+    ground: np.ndarray, later: np.ndarray, noise: np.ndarray, polarity: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return between which gray values the light on ground (k, 4, m) makes it, shape (k,) each.
+    """Return up to which gray values ground (k, 4, m) is as light makes it, shape (k,) each.
 
-    A small part of the ground that is darker is covered. What is brighter, has soft borders and
-    leaves much of a target as it is, is under glare. All else is light.
+    A small part of white ground that is darker is covered, and one of dark ground that is
+    brighter. White ground that is brighter, has soft borders and leaves much of a target as it is,
+    is under glare. All else is light.
     """
     logs, of_later = (np.log(of + np.float32(LOG_OFFSET)) for of in (ground, later))
     values = logs.reshape(len(logs), logs.shape[1] * logs.shape[2])
     usual = medians(values)
     spread = medians(np.abs(values - usual[:, None])) * NORMAL
     width = _UNLIKE * np.maximum(np.maximum(spread, _EVEN), noise / np.exp(usual))
-    dark = logs < (usual - width)[:, None, None]
-    darker = (dark[:, ::2] | dark[:, 1::2]).mean(axis=(1, 2))
+    aside = (logs - usual[:, None, None]) * polarity[:, None, None] < -width[:, None, None]
+    other = (aside[:, ::2] | aside[:, 1::2]).mean(axis=(1, 2))
     across, along = logs[:, 1::2] - logs[:, ::2], (of_later - logs)[:, ::2]
     edges = (np.maximum(np.abs(across), np.abs(along)) > LIGHT_EDGE).mean(axis=(1, 2))
-    light = (darker > _LIGHT) | (edges > _LIGHT)
-    shade = np.where(light, 0, np.exp(usual - width) - LOG_OFFSET)
+    soft, dark = edges <= _GLARE_EDGES, polarity > 0
+    light = (other > _LIGHT) | (edges > _LIGHT) | (soft & ~dark)
+    nothing = np.where(dark, 0.0, np.inf)
+    shade = np.where(light, nothing, np.exp(usual - polarity * width) - LOG_OFFSET)
     white = (ground >= SATURATED).mean(axis=(1, 2))
     glare = np.minimum(np.exp(usual + width) - LOG_OFFSET, SATURATED)
-    glare = np.where(edges > _GLARE_EDGES, _NO_GLARE, glare)
+    glare = np.where(soft, glare, _NO_GLARE)
     glare = np.where(white > _WHITE_OUT, np.inf, glare)
     return shade.astype(np.float32), glare.astype(np.float32)
 
