@@ -195,6 +195,7 @@ PAGES: dict[str, dict[str, Callable[[], str]]] = {
     'docs/figures.md': {'summary': summary, 'lights': lights, 'others': others},
     'docs/figures/disturbances.md': {
         **{name: partial(disturbed, name) for name in TABLES},
+        'bright': partial(disturbed, 'disturbances', 'disturbances_bright'),
         'look-alikes': partial(disturbed, 'look-alikes', 'disturbances_lookalikes'),
         'other families': partial(disturbed, 'disturbances', 'disturbances_families'),
         'square markers': partial(disturbed, 'disturbances', 'disturbances_square'),

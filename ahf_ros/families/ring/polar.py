@@ -286,9 +286,9 @@ def _usual_levels(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return up to which gray values ground (k, 4, m) is as light makes it, shape (k,) each.
 
-    A small part of white ground that is darker is covered, and one of dark ground that is
-    brighter. White ground that is brighter, has soft borders and leaves much of a target as it is,
-    is under glare. All else is light.
+    A small part of white ground that is darker is covered, and one of dark ground that is brighter
+    but has no soft borders and is not blown out, as glare is. White ground that is brighter, has
+    soft borders and leaves much of a target as it is, is under glare. All else is light.
     """
     logs, of_later = (np.log(of + np.float32(LOG_OFFSET)) for of in (ground, later))
     values = logs.reshape(len(logs), logs.shape[1] * logs.shape[2])
@@ -300,7 +300,8 @@ def _usual_levels(
     across, along = logs[:, 1::2] - logs[:, ::2], (of_later - logs)[:, ::2]
     edges = (np.maximum(np.abs(across), np.abs(along)) > LIGHT_EDGE).mean(axis=(1, 2))
     soft, dark = edges <= _GLARE_EDGES, polarity > 0
-    light = (other > _LIGHT) | (edges > _LIGHT) | (soft & ~dark)
+    blown = (aside & (ground >= SATURATED)).any(axis=(1, 2))
+    light = (other > _LIGHT) | (edges > _LIGHT) | ((soft | blown) & ~dark)
     nothing = np.where(dark, 0.0, np.inf)
     shade = np.where(light, nothing, np.exp(usual - polarity * width) - LOG_OFFSET)
     white = (ground >= SATURATED).mean(axis=(1, 2))
