@@ -233,41 +233,42 @@ static void step_odds(count m, count n, look of, const float shares[n], float re
                   at[MARKED_BAND], steps[TOLD], steps[ANYTHING], steps[MARK], steps[KNOWN], looks[s]);
 }
 
-/* Where something covers the ground beside either edge of a band, which is no shadow and no light:
-   marks in shadow are darker than those in the light, and nothing that covers a target is. */
+/* Where something covers the ground beside either edge of a band. Ground in shadow, or dark ground in
+   a stronger light, shows marks that are darker, or brighter, than elsewhere; a cover shows none. */
 static void covered_ground(count m, count n, look of, const target *it, float light_edge,
                            float marked_share, float read[2][READ][m], float looks[2][n][m],
                            float lit[2][m], bool covered[2][m])
 {
     float shade = (float)it->shade;
-    count every = 0, in_shadow = 0; /* and `lit`, ground as paper */
+    count every = 0, marked = 0; /* and `lit`, ground as paper */
     for (int side = 0; side < 2; side++)
         for (count a = 0; a < m; a++) {
             float ground = read[side][GROUND][a], here = read[side][BAND][a];
             lit[side][a] = greater_f(ground, ground / (1 + read[side][MARKED][a] * (of.ink - 1)));
-            bool dim = read[side][COUNTS][a] > 0 && is_covered(it, lit[side][a]);
-            covered[side][a] = dim;
-            every += dim;
+            bool differs = read[side][COUNTS][a] > 0 && is_covered(it, lit[side][a]);
+            covered[side][a] = differs;
+            every += differs;
             float ink = printed(of, shade, 0, 1, here);
-            in_shadow += dim && looks[side][n - 1][a] > looks[side][0][a] &&
-                         (it->polarity > 0 ? here < ink : here > ink);
+            marked += differs && looks[side][n - 1][a] > looks[side][0][a] &&
+                      (it->polarity > 0 ? here < ink : here > ink);
         }
-    bool shadow = (float)in_shadow > marked_share * (float)every;
+    bool is_light = (float)marked > marked_share * (float)every;
     for (count a = 0; a < m; a++) {
-        bool ground_as_ink[2], across = true, dim[2];
+        bool ground_as_ink[2], across = true, differs[2];
         if (!covered[0][a] && !covered[1][a])
             continue;
         for (int side = 0; side < 2; side++) {
-            dim[side] = covered[side][a] && !shadow;
+            differs[side] = covered[side][a] && !is_light;
             float as_ink = logarithm_f(raised(of, printed(of, shade, 0, 1, lit[side][a])));
             float of_ground = logarithm_f(raised(of, read[side][GROUND][a]));
             float of_band = logarithm_f(raised(of, read[side][BAND][a]));
             ground_as_ink[side] = fabsf(of_ground - as_ink) < light_edge;
             across &= fabsf(of_band - as_ink) < light_edge;
         }
-        /* The border of what is as dark as ink looks like the edge of a mark. */
+        /* The border of what is like ink looks like the edge of a mark. */
         for (int side = 0; side < 2; side++)
-            covered[side][a] = dim[side] || (dim[1 - side] && ground_as_ink[1 - side] && across);
+            covered[side][a] =
+                differs[side] || (differs[1 - side] && ground_as_ink[1 - side] && across);
     }
 }
 

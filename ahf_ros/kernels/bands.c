@@ -192,8 +192,8 @@ static inline count angle_after(int64_t first, count i, count m)
 }
 
 /* Evidence for words with their best covers, from that for what they show. A cover has its `price`
-   and a `cost` at each angle, and an angle beside it `most` evidence; one that looks like paper has its
-   own price, and its evidence at each angle, on paper and on marks. */
+   and a `cost` at each angle, and an angle beside it counts for no more than `most`; one that looks
+   like paper has its own price, and its evidence at each angle, on paper and on marks. */
 void covered_words(rows k, count w, count n, count m, const float looks[k][n][m],
                    const uint8_t steps[k][w][m], const int64_t first[k],
                    const float as_paper[2][k][m], float price, const float cost[k],
