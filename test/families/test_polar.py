@@ -15,11 +15,11 @@ BAND = (2.25, 3.5)
 ANGLES = 60
 
 
-def polar(image: np.ndarray, polarity: int = 1, *, everything: bool = True) -> PolarImages:
+def polar(image: np.ndarray, polarity: int = 1, *, covers: bool = True) -> PolarImages:
     """Return the polar image of a dot of 12 px at (60, 60)."""
     gray = np.minimum(image, 255).astype(np.float32)
     dot = measured(gray, [60.0], [60.0], 12.0, polarity)
-    return polar_images(gray, dot, BAND, ANGLES, everything=everything)
+    return polar_images(gray, dot, BAND, ANGLES, covers=covers)
 
 
 def usual_levels(image: np.ndarray) -> tuple[float, float]:
@@ -53,7 +53,7 @@ def test_what_is_bright_on_a_small_part_of_dark_ground_covers_it() -> None:
     covered, half = (np.where(of, 2.5, 1.0) * bright for of in (AWAY < 15, X < 55))
     lit = bright + 40 * np.exp(-0.5 * (AWAY / 12) ** 2)
     assert 46 < polar(covered, -1).shade[0] < 60
-    assert polar(covered, -1, everything=False).shade[0] == np.inf
+    assert polar(covered, -1, covers=False).shade[0] == np.inf
     assert [float(polar(it, -1).shade[0]) for it in (bright, half, lit)] == [np.inf] * 3
 
 

@@ -48,15 +48,15 @@ def read_known(
             continue
         gray = octave.pyramid.gray
         frames = frame.enlarged(known.frames[which], -octave.level)
-        first = measure_dots(gray, replace(known.select(which), frames=frames), covariances=True)
-        families = with_measured_bands(gray, first, families)
-        seen = first.share >= ENOUGH
+        dots = measure_dots(gray, replace(known.select(which), frames=frames), covariances=True)
+        families = with_measured_bands(gray, dots, families)
+        seen = dots.share >= ENOUGH
         if not seen.any():
             continue
-        first, which = first.select(seen), which[seen]
-        printed = _printed(first, frames[seen])
+        dots, which = dots.select(seen), which[seen]
+        printed = _printed(dots, frames[seen])
         prior = Prior.after(expected, found.edge_shift[found.certain] / 2**octave.level)
-        read = _read(gray, printed, first, names[which], families, prior)
+        read = _read(gray, printed, dots, names[which], families, prior)
         read = at_full_size(pyramid.images[: octave.level + 1], read)
         found = Hypotheses.joined([found, read])
     return as_described(found, settings.codes(RingPrint))
@@ -86,7 +86,7 @@ def _read(
         rest[own[read.certain]] = False
         found.append(read.select(read.certain))
     if rest.any():
-        dots = measure_dots(gray, dots.select(rest), covariances=True)  # as a search has them
+        dots = measure_dots(gray, dots.select(rest), covariances=True)  # twice, as in a search
         found.append(read_families(gray, dots, codes, prior))
     return Hypotheses.joined(found)
 

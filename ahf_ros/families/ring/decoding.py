@@ -150,6 +150,7 @@ def decode(
     bands = _Bands.of(evidence, of_bands, overhang, family)
     words, phases = _at_near_phases(words, phases)
     steps = bands.steps(words, phases)
+    # Which word it is, borders of covers do not tell; that it is one, they may.
     scores = bands.scores(steps, ends=draft)
     ids = canonical(words, family)[1]
     likely = scores + prior(words, family, expected)

@@ -182,12 +182,12 @@ def polar_images(
     circles: int = CIRCLES,
     ratio: float = PRINTED,
     *,
-    everything: bool = False,
+    covers: bool = False,
 ) -> PolarImages:
     """Return the polar images of targets at some angles, see `angles_of`, on some circles.
 
-    Black is lifted to a `ratio` of ink and paper, see `black_lift`. Bright spots of light lie
-    between others, which cover their ground only where `everything` may cover it.
+    Black is lifted to a `ratio` of ink and paper, see `black_lift`. What is brighter than dark
+    ground is mostly light, as spots lie between others; whether it `covers` the ground is asked.
     """
     inner, outer = band
     outermost = outer + _MARGIN
@@ -198,9 +198,8 @@ def polar_images(
     ground = values[:, [np.abs(radii - place).argmin() for place in places]]
     apart = 2 * np.pi * inner * dots.size / count
     noise = np.clip(reading_noise(gray, dots.frames, outermost), *_NOISE)
-    shade, glare = _usual_levels(ground, _later(ground, apart), noise, dots.polarity)
-    if not everything:
-        shade = np.where(dots.polarity > 0, shade, np.float32(np.inf))
+    levels = ground, _later(ground, apart), noise, dots.polarity
+    shade, glare = _usual_levels(*levels, covers=covers)
     return PolarImages(
         gray=values,
         row=np.arange(len(values)),
@@ -282,13 +281,19 @@ def _later(ground: np.ndarray, apart: np.ndarray) -> np.ndarray:
 
 
 def _usual_levels(
-    ground: np.ndarray, later: np.ndarray, noise: np.ndarray, polarity: np.ndarray
+    ground: np.ndarray,
+    later: np.ndarray,
+    noise: np.ndarray,
+    polarity: np.ndarray,
+    *,
+    covers: bool,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return up to which gray values ground (k, 4, m) is as light makes it, shape (k,) each.
+    """Return `PolarImages.shade` and `glare` of ground (k, 4, m), shape (k,) each.
 
-    A small part of white ground that is darker is covered, and one of dark ground that is brighter
-    but has no soft borders and is not blown out, as glare is. White ground that is brighter, has
-    soft borders and leaves much of a target as it is, is under glare. All else is light.
+    A small part of white ground that is darker is covered, and, if that is asked, one of dark
+    ground that is brighter but has no soft borders and is not blown out, as glare is. Darker parts
+    of dark ground lie beside bright marks, where cameras sharpen. White ground that is brighter,
+    has soft borders and leaves much of a target as it is, is under glare. All else is light.
     """
     logs, of_later = (np.log(of + np.float32(LOG_OFFSET)) for of in (ground, later))
     values = logs.reshape(len(logs), logs.shape[1] * logs.shape[2])
@@ -301,7 +306,7 @@ def _usual_levels(
     edges = (np.maximum(np.abs(across), np.abs(along)) > LIGHT_EDGE).mean(axis=(1, 2))
     soft, dark = edges <= _GLARE_EDGES, polarity > 0
     blown = (aside & (ground >= SATURATED)).any(axis=(1, 2))
-    light = (other > _LIGHT) | (edges > _LIGHT) | ((soft | blown) & ~dark)
+    light = (other > _LIGHT) | (edges > _LIGHT) | ~(dark | (covers & ~soft & ~blown))
     nothing = np.where(dark, 0.0, np.inf)
     shade = np.where(light, nothing, np.exp(usual - polarity * width) - LOG_OFFSET)
     white = (ground >= SATURATED).mean(axis=(1, 2))

@@ -164,7 +164,7 @@ def _read_lifted(
     bands = replace(fit, frames=frame.scaled(fit.frames, np.where(printed, fit.proportion, 1)))
     growth = fit.polarity * fit.edge_shift / bands.size
     angles = family.bits * PER_SECTOR
-    polar = polar_images(gray, bands, family.band, angles, ratio=ratio, everything=True)
+    polar = polar_images(gray, bands, family.band, angles, ratio=ratio, covers=True)
     polar = on_dark_ground(polar, family.band, fit.share >= ENOUGH)
     edges = edge_evidence(polar, np.ones(len(growth)), growth, family.band, SHARES)
     words = decode(edges, _overhang(growth, family), family, prior.expected)
