@@ -52,9 +52,12 @@ def test_what_is_bright_on_a_small_part_of_dark_ground_covers_it() -> None:
     bright = np.where(np.hypot(X - 60, Y - 60) < 12, 180.0, 45.0)
     covered, half = (np.where(of, 2.5, 1.0) * bright for of in (AWAY < 15, X < 55))
     lit = bright + 40 * np.exp(-0.5 * (AWAY / 12) ** 2)
+    turned = np.arctan2(Y - 60, X - 60)
+    three, spots = (np.where(np.cos(n * turned) > 0.6, 2.5, 1.0) * bright for n in (3, 6))
+    assert 46 < polar(three, -1).shade[0] < 60
     assert 46 < polar(covered, -1).shade[0] < 60
     assert polar(covered, -1, covers=False).shade[0] == np.inf
-    assert [float(polar(it, -1).shade[0]) for it in (bright, half, lit)] == [np.inf] * 3
+    assert [float(polar(it, -1).shade[0]) for it in (bright, half, lit, spots)] == [np.inf] * 4
 
 
 def test_circles_are_read_between_two_others() -> None:

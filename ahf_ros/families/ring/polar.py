@@ -52,6 +52,7 @@ _EVEN = 0.015  # deviation of ln of ground in even light
 _UNLIKE = 4.0  # standard deviations of ground, from which a level is unlike the rest
 _LIGHT = 0.34  # share of the ground that differs, or has edges, from which that is light
 _GLARE_EDGES = 0.03  # share of the ground, more than edges of glare have
+_PLACES = 3  # of a circle that something covers of dark ground, at most; spots light up more
 _WHITE_OUT = 0.6  # share of the ground that is saturated, from which that is no glare
 _ASIDE = 0.15  # least distance from the band at which its ground may end, dot radii
 _TURN = 15  # between squares that are tried, degrees
@@ -290,10 +291,11 @@ def _usual_levels(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return `PolarImages.shade` and `glare` of ground (k, 4, m), shape (k,) each.
 
-    A small part of white ground that is darker is covered, and, if that is asked, one of dark
-    ground that is brighter but has no soft borders and is not blown out, as glare is. Darker parts
-    of dark ground lie beside bright marks, where cameras sharpen. White ground that is brighter,
-    has soft borders and leaves much of a target as it is, is under glare. All else is light.
+    A small part of white ground that is darker is covered. So is, if that is asked, one of dark
+    ground that is brighter, unless it lies in many places about the target, as spots of light do,
+    or has soft borders or is blown out, as glare has and is. Darker parts of dark ground lie
+    beside bright marks, where cameras sharpen. White ground that is brighter, has soft borders
+    and leaves much of a target as it is, is under glare. All else is light.
     """
     logs, of_later = (np.log(of + np.float32(LOG_OFFSET)) for of in (ground, later))
     values = logs.reshape(len(logs), logs.shape[1] * logs.shape[2])
@@ -306,7 +308,9 @@ def _usual_levels(
     edges = (np.maximum(np.abs(across), np.abs(along)) > LIGHT_EDGE).mean(axis=(1, 2))
     soft, dark = edges <= _GLARE_EDGES, polarity > 0
     blown = (aside & (ground >= SATURATED)).any(axis=(1, 2))
-    light = (other > _LIGHT) | (edges > _LIGHT) | ~(dark | (covers & ~soft & ~blown))
+    outermost = aside[:, -1]
+    spots = (outermost & ~np.roll(outermost, 1, axis=1)).sum(axis=1) > _PLACES
+    light = (other > _LIGHT) | (edges > _LIGHT) | ~(dark | (covers & ~soft & ~blown & ~spots))
     nothing = np.where(dark, 0.0, np.inf)
     shade = np.where(light, nothing, np.exp(usual - polarity * width) - LOG_OFFSET)
     white = (ground >= SATURATED).mean(axis=(1, 2))
