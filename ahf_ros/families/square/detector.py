@@ -305,8 +305,9 @@ def _places_of(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
     Two of them have one place where one is within the reach of the other.
     """
-    diagonals = np.linalg.norm(corners[:, 2:] - corners[:, :2], axis=2)
-    return corners.mean(axis=1), _SAME_PLACE * diagonals.max(axis=1)
+    diagonals = corners[:, 2:] - corners[:, :2]
+    twice_areas = np.abs(np.linalg.det(diagonals))
+    return corners.mean(axis=1), _SAME_PLACE * np.sqrt(twice_areas)
 
 
 def _fitted(gray: np.ndarray, corners: np.ndarray, ink: np.ndarray) -> Places:

@@ -8,6 +8,9 @@ which is one more unknown.
 Paper that covers a side has an edge that may look like the side. The edges inside the marker tell
 that it is not: robust least squares have several solutions, and that with most edges is taken.
 They are looked for with all edges from the start, and with those inside first.
+
+Paper is not quite flat, and printers do not feed it evenly. Where edges are off by more than the
+image tells, their own errors are what is known of the place.
 """
 
 from __future__ import annotations
@@ -28,7 +31,7 @@ from ahf_ros.vision.edge_fit import WEAK_PRIOR, EdgeKind, Outlines, fit_edges
 from ahf_ros.vision.frame import centre_covariance, changed, outline_basis, project
 from ahf_ros.vision.growth import growth_in_light
 from ahf_ros.vision.profiles import BLURS, USUAL_BLUR, Edges
-from ahf_ros.vision.robust import geman_mcclure_gain, median
+from ahf_ros.vision.robust import NORMAL, geman_mcclure_gain, median
 
 _ALONG = np.array([0.25, 0.5, 0.75])  # where edges are measured along a cell
 _REACH = 0.45  # of profiles, in cells, as the next edge is that far
@@ -41,9 +44,12 @@ _LARGEST_CHANGE = 0.5  # of a frame at a time, cells
 _ROUNDS = 6  # iterations of robust least squares
 _MINIMUM_ERROR = 0.02  # minimum of the usual error, px
 _PLACED = 0.15  # maximum error of an edge that is where it should be, px
+_NOT_FLAT = 0.05  # the same of a print that is bent or printed unevenly, cells
 _OF_SLOPE = 0.55  # share of edges that a slope of the light may look like: those of its direction
 _ENOUGH = 0.4  # share of edges where they should be; where it is less, there is no marker
 _DOUBTFUL = 0.8  # the same; where it is less, a side may not be the marker's
+# Whether edges inside come first, whether the print is flat, and the share of those tried again.
+_ATTEMPTS = (False, True, 1.0), (True, True, _DOUBTFUL), (False, False, _ENOUGH)
 _LIGHT_REACH = 1.5  # standard deviation of the window that smooths the light, profiles
 _LIGHT_PRIOR = 1.0  # weight of the prior, a slope of zero, in profiles
 _THROUGH = 6.0  # of what the next edges do to a centre, px, by (blur / cell)^4
@@ -67,13 +73,13 @@ def fit_markers(gray: np.ndarray, corners: np.ndarray, prints: np.ndarray) -> Pl
     large = side_lengths(corners).min(axis=1) >= _SMALLEST_CELL * prints.shape[1]
     for first in range(0, len(corners), _TOGETHER):
         which = first + np.flatnonzero(large[first : first + _TOGETHER])
-        for inside_first in (False, True):
+        for inside_first, flat, least in _ATTEMPTS:
+            which = which[places.share[which] < least]
             if not which.size:
                 break
-            found = _fitted(gray, corners[which], prints[which], inside_first)
+            found = _fitted(gray, corners[which], prints[which], inside_first, flat)
             better = found.share > places.share[which]
             places = places.replaced(which[better], found.select(better))
-            which = which[places.share[which] < _DOUBTFUL]
     refused = places.share < _ENOUGH
     return places.replaced(refused, Places.unmeasured(corners[refused]))
 
@@ -125,9 +131,12 @@ def _kind(cells: int) -> EdgeKind:
 
 
 def _fitted(
-    gray: np.ndarray, corners: np.ndarray, prints: np.ndarray, inside_first: bool
+    gray: np.ndarray, corners: np.ndarray, prints: np.ndarray, inside_first: bool, flat: bool
 ) -> Places:
-    """Return markers fitted to their edges, or at first to those inside."""
+    """Return markers fitted to their edges, or at first to those inside.
+
+    Edges of a print that is not `flat` may be farther off, which adds to the covariance.
+    """
     cells = prints.shape[1]
     grid, kind, expected = _grid(cells), _kind(cells), _polarity(prints)
     frames, cell = square_frames(corners), side_lengths(corners).min(axis=1) / cells
@@ -142,7 +151,9 @@ def _fitted(
             blur = np.clip(used + median(edges.softness, edges.visible, 0.0), *BLURS)
         limit = _LARGEST_CHANGE / cells
         frames = changed(frames, np.clip(fit.unknowns[:, :-1], -limit, limit))
-    placed = own.seen & (np.abs(fit.errors * edges.scale) < _PLACED)
+    errors = np.abs(fit.errors * edges.scale)
+    limits = np.maximum(_PLACED, (not flat) * _NOT_FLAT * cell)
+    placed = own.seen & (errors < limits[:, None])
     count = np.maximum((outlines.polarity != 0).sum(axis=1), 1)
     share = np.where(own.seen.sum(axis=1) > _OF_SLOPE * count, placed.sum(axis=1) / count, 0.0)
     basis = np.broadcast_to(kind.basis, (*edges.scale.shape, kind.basis.shape[1]))
@@ -153,6 +164,7 @@ def _fitted(
     normal = np.diag(kind.prior) + rows.swapaxes(1, 2) @ gained
     covariance = centre_covariance(frames, grouped_covariance(normal, of_cells.swapaxes(1, 2)))
     through = _THROUGH * (blur / cell) ** 4
-    covariance += (through**2)[:, None, None] * np.eye(2)
+    bent = 0.0 if flat else NORMAL * median(errors, own.seen, 0.0)
+    covariance += (through**2 + bent**2)[:, None, None] * np.eye(2)
     growth = growth_in_light(fit.unknowns[:, -1], blur, own.contrast)
     return Places(project(frames, SQUARE), share, covariance, growth)
