@@ -151,6 +151,7 @@ def minimise(
         equations = conditions.added(equations)
         border, gaps = conditions.border()
         before = _losses(lengths, spread, loss)[0] + conditions.cost
+        rejected = False
         while True:
             reduced = reduce(equations.damped(damping))
             poses, rest, multipliers = solve(reduced, border, gaps)
@@ -166,11 +167,14 @@ def minimise(
             )
             penalty = 2 * np.abs(multipliers)  # of what has to hold exactly [2]_
             if after + penalty @ np.abs(known.border()[1]) < before + penalty @ np.abs(gaps):
-                state, damping = trial, max(damping / 10, np.finfo(float).eps)
+                state = trial
                 break
+            rejected = True
             damping *= 10
             if damping > _LARGEST_DAMPING:
                 return state, False
+        if not rejected:
+            damping = max(damping / 10, np.finfo(float).eps)
     return state, False
 
 

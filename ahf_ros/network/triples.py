@@ -194,6 +194,8 @@ def _seeds_of(
         if seed is None:
             continue
         found.append(seed)
+        if unknown and not _unexplained(part, seed.state):
+            break  # other focal lengths explain no more
     if found:
         best = min(found, key=lambda one: one.cost)
         seed = _refined(part, mirrored(best.state), triple, unknown)
