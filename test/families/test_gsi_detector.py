@@ -33,7 +33,7 @@ def test_letters_are_no_dots(seed: int) -> None:
 
 
 @pytest.mark.lasting
-@pytest.mark.parametrize('seed', [101, 102])
+@pytest.mark.parametrize('seed', [101, 102, 103])
 def test_threads_are_no_dots(seed: int) -> None:
     assert detect(weave(seed)) == []
 

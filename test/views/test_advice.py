@@ -215,14 +215,15 @@ def test_a_few_rings_in_each_of_several_images_are_told_together(
     file.write_text('family: mine\nbits: 9\nband: [1.6, 2.4]\nwords: all\n')
     mine = {'family': 'mine', 'family_file': str(file), 'targets': 4, 'width': 440, 'height': 330}
     images = [shown(**mine, seed=it) for it in range(6)]
+    assert [line for image in images for line in advice(image, DetectorSettings())] == []
     line = '24 dots with a band of 9 sectors that no known family has: `ahf learn-family`'
     line += ' describes it'
     named = [(f'{number}.png', image) for number, image in enumerate(images)]
     together = f'6 images together: {line}'
     assert advice_on_all(iter(named), DetectorSettings()) == [together]  # each is read once
-    assert advice_on_all(named[-1:], DetectorSettings()) == []
+    assert advice_on_all(named[:1], DetectorSettings()) == []
     ten = ('ten.png', shown(family='cct10'))
-    (first,) = advice_on_all([named[0], ten, *named], DetectorSettings(family='metashape12'))
+    (first,) = advice_on_all([*named[:2], ten, *named], DetectorSettings(family='metashape12'))
     assert first == 'ten.png: 12 dots with a band of 10 sectors: --family cct10'
     busy = [('a.png', texture()), ('b.png', spots(30, 22, 11))]
     assert advice_on_all(busy, DetectorSettings()) == []
