@@ -315,7 +315,9 @@ def _fitted(gray: np.ndarray, corners: np.ndarray, ink: np.ndarray) -> Places:
     fit = lay_prints(gray, Places.unmeasured(corners), ink, _PRINTED)
     rest = fit.share == 0
     edges = fit_markers(gray, corners[rest], ink[rest])
-    return fit.replaced(rest, lay_prints(gray, edges, ink[rest]))
+    fit = fit.replaced(rest, lay_prints(gray, edges, ink[rest]))
+    rest = fit.share == 0
+    return fit.replaced(rest, fit_markers(gray, corners[rest], ink[rest], flat=False))
 
 
 def _from_halves(gray: np.ndarray, corners: np.ndarray, ink: np.ndarray) -> np.ndarray:

@@ -31,7 +31,7 @@ from ahf_ros.vision.edge_fit import WEAK_PRIOR, EdgeKind, Outlines, fit_edges
 from ahf_ros.vision.frame import centre_covariance, changed, outline_basis, project
 from ahf_ros.vision.growth import growth_in_light
 from ahf_ros.vision.profiles import BLURS, USUAL_BLUR, Edges
-from ahf_ros.vision.robust import NORMAL, geman_mcclure_gain, median
+from ahf_ros.vision.robust import geman_mcclure_gain, median
 
 _ALONG = np.array([0.25, 0.5, 0.75])  # where edges are measured along a cell
 _REACH = 0.45  # of profiles, in cells, as the next edge is that far
@@ -48,15 +48,15 @@ _NOT_FLAT = 0.05  # the same of a print that is bent or printed unevenly, cells
 _OF_SLOPE = 0.55  # share of edges that a slope of the light may look like: those of its direction
 _ENOUGH = 0.4  # share of edges where they should be; where it is less, there is no marker
 _DOUBTFUL = 0.8  # the same; where it is less, a side may not be the marker's
-# Whether edges inside come first, whether the print is flat, and the share of those tried again.
-_ATTEMPTS = (False, True, 1.0), (True, True, _DOUBTFUL), (False, False, _ENOUGH)
 _LIGHT_REACH = 1.5  # standard deviation of the window that smooths the light, profiles
 _LIGHT_PRIOR = 1.0  # weight of the prior, a slope of zero, in profiles
 _THROUGH = 6.0  # of what the next edges do to a centre, px, by (blur / cell)^4
 _TOGETHER = 200  # markers at a time, which bounds the memory
 
 
-def fit_markers(gray: np.ndarray, corners: np.ndarray, prints: np.ndarray) -> Places:
+def fit_markers(
+    gray: np.ndarray, corners: np.ndarray, prints: np.ndarray, *, flat: bool = True
+) -> Places:
     """Return markers placed by the edges of their prints, or unmeasured where these are not seen.
 
     Parameters
@@ -68,18 +68,20 @@ def fit_markers(gray: np.ndarray, corners: np.ndarray, prints: np.ndarray) -> Pl
         image, the first one that of the upright marker.
     prints : ndarray of bool, shape (k, n, n)
         Their cells, borders included, True where there is ink.
+    flat : bool
+        Whether they are flat. Edges of others may be farther off, which adds to the covariance.
     """
     places = Places.unmeasured(corners)
     large = side_lengths(corners).min(axis=1) >= _SMALLEST_CELL * prints.shape[1]
     for first in range(0, len(corners), _TOGETHER):
         which = first + np.flatnonzero(large[first : first + _TOGETHER])
-        for inside_first, flat, least in _ATTEMPTS:
-            which = which[places.share[which] < least]
+        for inside_first in (False, True):
             if not which.size:
                 break
             found = _fitted(gray, corners[which], prints[which], inside_first, flat)
             better = found.share > places.share[which]
             places = places.replaced(which[better], found.select(better))
+            which = which[places.share[which] < _DOUBTFUL]
     refused = places.share < _ENOUGH
     return places.replaced(refused, Places.unmeasured(corners[refused]))
 
@@ -133,10 +135,7 @@ def _kind(cells: int) -> EdgeKind:
 def _fitted(
     gray: np.ndarray, corners: np.ndarray, prints: np.ndarray, inside_first: bool, flat: bool
 ) -> Places:
-    """Return markers fitted to their edges, or at first to those inside.
-
-    Edges of a print that is not `flat` may be farther off, which adds to the covariance.
-    """
+    """Return markers fitted to their edges, or at first to those inside."""
     cells = prints.shape[1]
     grid, kind, expected = _grid(cells), _kind(cells), _polarity(prints)
     frames, cell = square_frames(corners), side_lengths(corners).min(axis=1) / cells
@@ -164,7 +163,9 @@ def _fitted(
     normal = np.diag(kind.prior) + rows.swapaxes(1, 2) @ gained
     covariance = centre_covariance(frames, grouped_covariance(normal, of_cells.swapaxes(1, 2)))
     through = _THROUGH * (blur / cell) ** 4
-    bent = 0.0 if flat else NORMAL * median(errors, own.seen, 0.0)
-    covariance += (through**2 + bent**2)[:, None, None] * np.eye(2)
+    covariance += (through**2)[:, None, None] * np.eye(2)
+    if not flat:  # errors of neighbouring edges have much in common
+        bent = (own.seen * errors**2).sum(axis=1) / np.maximum(own.seen.sum(axis=1), 1)
+        covariance += bent[:, None, None] * np.eye(2)
     growth = growth_in_light(fit.unknowns[:, -1], blur, own.contrast)
     return Places(project(frames, SQUARE), share, covariance, growth)
