@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from ahf_ros.base.target import Target
+from ahf_ros.base.target import UNDECODED, Target
 from ahf_ros.families.claims import reported
 from ahf_ros.families.contract import ExpectingDetector
+from ahf_ros.families.explained import without_targets
 from ahf_ros.vision.faint_targets import with_faint_targets
 from ahf_ros.vision.image import as_gray, check_image
 from ahf_ros.vision.pyramid import ImagePyramid, image_pyramid
@@ -48,14 +49,21 @@ class PyramidDetector(ExpectingDetector):
     def in_any_contrast(
         self, pyramid: ImagePyramid, search: Callable[[ImagePyramid], list[Target]]
     ) -> list[Target]:
-        """Return what a search finds in an image, and in its parts of faint contrast."""
+        """Return what a search finds in an image, and in its parts of faint contrast.
+
+        Targets that are identified are painted over before parts are looked for: narrow rings
+        have a faint contrast of their own, and would be read twice.
+        """
         if not self.stretches:
             return search(pyramid)
 
         def stretched(gray: np.ndarray) -> list[Target]:
             return search(image_pyramid(gray, self.settings.max_radius, self.contrast))
 
-        return with_faint_targets(pyramid.image, search(pyramid), stretched)
+        found = search(pyramid)
+        known = [it for it in found if it.id != UNDECODED]
+        left = without_targets(pyramid.image, known, self.settings.prints)
+        return with_faint_targets(left, found, stretched)
 
     def contesting(self) -> Self:
         """Return a detector that also returns targets that share an ID; see `Contesting`."""
