@@ -8,6 +8,9 @@ Lifting black to what prints have undoes that.
 Where a camera sharpens as well, dark ground beside bright marks is darker than elsewhere by some
 gray values, which the logarithm makes steps as high as those of ink. Lifting black by more, as to
 `NEARLY_LINEAR`, makes them small, and the light on a target matters less than it does.
+
+Lifted black is for even light. In shadow it takes contrast from marks: of gray values 20 on 1,
+where light shows 160 on 8, hardly any is left. There black has to stay `AS_IT_IS`.
 """
 
 from __future__ import annotations
@@ -16,6 +19,12 @@ import numpy as np
 
 PRINTED = 0.25
 """Ratio of the gray values of ink and paper in usual prints, to which black is lifted."""
+
+BLACK = PRINTED / (1 + PRINTED)
+"""The same ratio, below which ink is lifted to that of prints."""
+
+AS_IT_IS = 0.0
+"""The ratio to which no black is lifted."""
 
 NEARLY_LINEAR = 0.6
 """The same for dark ground that sharpening makes uneven.
@@ -30,7 +39,7 @@ def black_lift(contrast: np.ndarray, bright: np.ndarray, ratio: float = PRINTED)
 
     `contrast` is the ratio of the gray values of ink and paper, and `bright` the gray value of
     paper. The larger the `ratio` to which black is lifted, the larger the contrast from which on
-    it stays as it is, which is 0.2 for that of prints.
+    it stays as it is, which is `BLACK` for that of prints.
 
     Examples
     --------

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
@@ -53,6 +54,8 @@ _UNLIKE = 4.0  # standard deviations of ground, from which a level is unlike the
 _LIGHT = 0.34  # share of the ground that differs, or has edges, from which that is light
 _GLARE_EDGES = 0.03  # share of the ground, more than edges of glare have
 _PLACES = 3  # of a circle that something covers of dark ground, at most; spots light up more
+_UNEVEN = 1.5  # ratio of the light on two tenths of the ground, the darkest and the brightest
+_PARTS = 20, 7  # of the ground about a target, and readings of each
 _WHITE_OUT = 0.6  # share of the ground that is saturated, from which that is no glare
 _ASIDE = 0.15  # least distance from the band at which its ground may end, dot radii
 _TURN = 15  # between squares that are tried, degrees
@@ -271,6 +274,16 @@ def _unmixed(ratio: np.ndarray, first: np.ndarray, second: np.ndarray | float) -
     """Return ink over paper, from the ratio of levels of which blur makes shares ink, (k,)."""
     ink = 1 + (ratio - 1) / np.maximum(first - second * ratio, _MINIMUM_SHARE)
     return np.asarray(np.maximum(ink, 1 / SATURATED))
+
+
+def in_uneven_light(gray: np.ndarray, dots: Fit, band: tuple[float, float]) -> np.ndarray:
+    """Return whether shadows or patterns lie on the ground about dots, bool, shape (k,)."""
+    inner, outer = band
+    radii, as_it_is = np.append(1 + (inner - 1) * GAP, outer + MARGIN), np.zeros(len(dots.frames))
+    values, _ = on_circles(gray, dots.frames, angles_of(math.prod(_PARTS)), radii, as_it_is)
+    parts = values.reshape(len(values), len(radii), *_PARTS).mean(axis=(1, 3))
+    dark, bright = np.quantile(np.maximum(parts, 0) + LOG_OFFSET, [0.1, 0.9], axis=1)
+    return np.asarray(bright > _UNEVEN * dark)
 
 
 def _later(ground: np.ndarray, apart: np.ndarray) -> np.ndarray:

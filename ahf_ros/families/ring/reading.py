@@ -38,13 +38,14 @@ from ahf_ros.families.ring.polar import (
     PART,
     PolarImages,
     angles_of,
+    in_uneven_light,
     on_circles,
     on_dark_ground,
     polar_images,
 )
 from ahf_ros.prints.ring import RingPrint, least_marked
 from ahf_ros.vision import frame
-from ahf_ros.vision.black import NEARLY_LINEAR, PRINTED
+from ahf_ros.vision.black import AS_IT_IS, BLACK, NEARLY_LINEAR, PRINTED
 from ahf_ros.vision.circle_fit import ENOUGH, NO_FITS, Fit, fit_circles
 
 PER_SECTOR = 10
@@ -134,14 +135,20 @@ def _read_part(
 ) -> Hypotheses:
     """Return what bands are read as in the frames of their drafts; see `read_bands`.
 
-    Ground that is darker than ink is in prints may be uneven by sharpening alone. Bright targets
-    on it that are doubtful in the logarithm are read nearly in gray values as well.
+    Where light on black print is uneven, or a reading is in doubt, black is read as it is as well.
+    Ground that is darker than ink is in prints may also be uneven by sharpening: bright targets on
+    it that are in doubt still are read nearly in gray values.
     """
     read = _read_lifted(gray, fit, family, prior, least, PRINTED)
-    black = (fit.polarity < 0) & (fit.contrast < PRINTED)
-    some = np.flatnonzero(black & ~read.certain & (read.confidence >= _POSSIBLE))
-    if not some.size:
-        return read
+    some = np.flatnonzero((fit.contrast < BLACK) & (read.confidence >= _POSSIBLE))
+    if some.size:
+        uneven = in_uneven_light(gray, fit.select(some), family.band)
+        some = some[uneven | ~read.certain[some]]
+        again = _read_lifted(gray, fit.select(some), family, prior, -np.inf, AS_IT_IS)
+        better = again.certain | (again.confidence > read.confidence[some])
+        read = read.replaced(some[better], again.select(better))
+    bright = (fit.polarity < 0) & (fit.contrast < PRINTED)
+    some = np.flatnonzero(bright & ~read.certain & (read.confidence >= _POSSIBLE))
     again = _read_lifted(gray, fit.select(some), family, prior, -np.inf, NEARLY_LINEAR)
     surer = again.confidence > read.confidence[some]
     return read.replaced(some[surer], again.select(surer))
