@@ -8,7 +8,8 @@ exposed several times too long. The scenes are those of `benchmarks.identificati
 other settings, scenes that nothing in the package was fitted to. `other` has finer patterns in
 another direction, a wider lens, more noise, and another gamma; `strange` has coarser patterns, a
 long lens with distortion, a noisy camera with a flat gamma, gray ink on coarse paper, and targets
-on white cards before a darker wall. Seeds from 101 on are for tests.
+on white cards before a darker wall. `linear` is an industrial camera, whose gray values are light,
+and black ink. Seeds from 101 on are for tests.
 
     python -m benchmarks.limits [--detector ring] [--family gsi] [--setting other]
         [--group 'edge shift'] [--rows 'radius 6, 0.12' ...] [--lights stripe ...] [--seeds 101]
@@ -95,6 +96,7 @@ SETTINGS: dict[str, dict[str, Any]] = {
         'texture': 0.04,
         'wall': 0.35,
     },
+    'linear': {'gamma': 1.0, 'black': 0.04},
 }
 """Settings of the renderer; nothing in the package was fitted to `other` and `strange`."""
 

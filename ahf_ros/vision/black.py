@@ -34,7 +34,9 @@ Of 28 bright targets in a photograph, 20 are read without it, 25 with 0.6, 26 wi
 """
 
 
-def black_lift(contrast: np.ndarray, bright: np.ndarray, ratio: float = PRINTED) -> np.ndarray:
+def black_lift(
+    contrast: np.ndarray, bright: np.ndarray, ratio: np.ndarray | float = PRINTED
+) -> np.ndarray:
     """Return the gray values that black is lifted to, float64, of the shape of both arrays.
 
     `contrast` is the ratio of the gray values of ink and paper, and `bright` the gray value of

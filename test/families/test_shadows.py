@@ -40,3 +40,22 @@ def test_black_print_is_read_in_shadows(family: str, polarity: str) -> None:
     of = seen(family, polarity)
     assert of.right >= of.expected - 1
     assert not of.wrong + of.false_positives
+
+
+@pytest.mark.parametrize('ambient', [0.3, 0.12])
+def test_black_marks_are_read_under_stripes(ambient: float) -> None:
+    scene = SceneSettings(
+        width=1280,
+        height=960,
+        targets=24,
+        dot_radius=8,
+        light='stripe',
+        ambient=ambient,
+        gamma=1.0,
+        black=0.04,
+        seed=44,
+    )
+    shown = render(scene)
+    of = score(shown, create_detector(family=scene.family)(shown.image))
+    assert of.right >= of.expected - 2
+    assert not of.wrong + of.false_positives

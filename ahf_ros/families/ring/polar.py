@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
@@ -10,7 +9,7 @@ import numpy as np
 
 from ahf_ros import kernels
 from ahf_ros.vision.array_record import ArrayRecord
-from ahf_ros.vision.black import PRINTED, black_lift, lifted
+from ahf_ros.vision.black import AS_IT_IS, BLACK, PRINTED, black_lift, lifted
 from ahf_ros.vision.circle_fit import Fit
 from ahf_ros.vision.image import SATURATED
 from ahf_ros.vision.logarithm import LOG_OFFSET
@@ -55,7 +54,7 @@ _LIGHT = 0.34  # share of the ground that differs, or has edges, from which that
 _GLARE_EDGES = 0.03  # share of the ground, more than edges of glare have
 _PLACES = 3  # of a circle that something covers of dark ground, at most; spots light up more
 _UNEVEN = 1.5  # ratio of the light on two tenths of the ground, the darkest and the brightest
-_PARTS = 20, 7  # of the ground about a target, and readings of each
+_PARTS, _READINGS = 20, 7  # of the ground about a target, and of each on a circle
 _WHITE_OUT = 0.6  # share of the ground that is saturated, from which that is no glare
 _ASIDE = 0.15  # least distance from the band at which its ground may end, dot radii
 _TURN = 15  # between squares that are tried, degrees
@@ -184,14 +183,15 @@ def polar_images(
     band: tuple[float, float],
     count: int,
     circles: int = CIRCLES,
-    ratio: float = PRINTED,
+    ratio: np.ndarray | float | None = None,
     *,
     covers: bool = False,
 ) -> PolarImages:
     """Return the polar images of targets at some angles, see `angles_of`, on some circles.
 
-    Black is lifted to a `ratio` of ink and paper, see `black_lift`. What is brighter than dark
-    ground is mostly light, as spots lie between others; whether it `covers` the ground is asked.
+    Black is lifted to a `ratio` of ink and paper, see `black_lift`, which is `lift_ratio` if none
+    is given. What is brighter than dark ground is mostly light, as spots lie between others;
+    whether it `covers` the ground is asked.
     """
     inner, outer = band
     outermost = outer + _MARGIN
@@ -240,7 +240,7 @@ def on_circles(
 
 
 def _appearance(
-    gray: np.ndarray, dots: Fit, band: tuple[float, float], ratio: float
+    gray: np.ndarray, dots: Fit, band: tuple[float, float], ratio: np.ndarray | float | None
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return contrasts of dots, and gray values that black is to be lifted to, shape (k,) each.
 
@@ -265,6 +265,7 @@ def _appearance(
     contrast = np.maximum(dots.contrast, np.minimum(by_levels, PRINTED))
     narrow = (inner - 1) * dots.size < _NARROW * np.maximum(dots.blur, USUAL_BLUR)
     contrast = np.where(narrow, np.minimum(contrast, np.maximum(bare, PRINTED)), contrast)
+    ratio = lift_ratio(gray, dots, band) if ratio is None else ratio
     lift = black_lift(contrast, dots.bright, ratio)
     dark, bright = (lifted(of, lift) for of in (contrast * dots.bright, dots.bright))
     return np.maximum(dark, _MINIMUM_LEVEL) / np.maximum(bright, _MINIMUM_LEVEL), lift
@@ -276,14 +277,26 @@ def _unmixed(ratio: np.ndarray, first: np.ndarray, second: np.ndarray | float) -
     return np.asarray(np.maximum(ink, 1 / SATURATED))
 
 
-def in_uneven_light(gray: np.ndarray, dots: Fit, band: tuple[float, float]) -> np.ndarray:
-    """Return whether shadows or patterns lie on the ground about dots, bool, shape (k,)."""
+def lift_ratio(gray: np.ndarray, dots: Fit, band: tuple[float, float]) -> np.ndarray:
+    """Return the ratios of ink and paper to which black is lifted, shape (k,).
+
+    Black marks stay as they are in uneven light. Ground that is black may be uneven by sharpening.
+    """
+    ratio = np.full(len(dots.frames), PRINTED)
+    marks = np.flatnonzero((dots.polarity > 0) & (dots.contrast < BLACK))
+    if marks.size:
+        ratio[marks[in_uneven_light(gray, dots.frames[marks], band)]] = AS_IT_IS
+    return ratio
+
+
+def in_uneven_light(gray: np.ndarray, frames: np.ndarray, band: tuple[float, float]) -> np.ndarray:
+    """Return whether shadows or patterns lie on the ground of targets, (k, 3, 3), bool, (k,)."""
     inner, outer = band
-    radii, as_it_is = np.append(1 + (inner - 1) * GAP, outer + MARGIN), np.zeros(len(dots.frames))
-    values, _ = on_circles(gray, dots.frames, angles_of(math.prod(_PARTS)), radii, as_it_is)
-    parts = values.reshape(len(values), len(radii), *_PARTS).mean(axis=(1, 3))
-    dark, bright = np.quantile(np.maximum(parts, 0) + LOG_OFFSET, [0.1, 0.9], axis=1)
-    return np.asarray(bright > _UNEVEN * dark)
+    radii, angles = np.append(1 + (inner - 1) * GAP, outer + MARGIN), angles_of(_PARTS * _READINGS)
+    values, _ = on_circles(gray, frames, angles, radii, np.zeros(len(frames)))
+    parts = values.reshape(len(frames), len(radii), _PARTS, _READINGS).mean(axis=(1, 3))
+    low, high = np.quantile(np.maximum(parts, 0) + LOG_OFFSET, [0.1, 0.9], axis=1)
+    return np.asarray(high > _UNEVEN * low)
 
 
 def _later(ground: np.ndarray, apart: np.ndarray) -> np.ndarray:

@@ -39,6 +39,7 @@ from ahf_ros.families.ring.polar import (
     PolarImages,
     angles_of,
     in_uneven_light,
+    lift_ratio,
     on_circles,
     on_dark_ground,
     polar_images,
@@ -135,23 +136,25 @@ def _read_part(
 ) -> Hypotheses:
     """Return what bands are read as in the frames of their drafts; see `read_bands`.
 
-    Where light on black print is uneven, or a reading is in doubt, black is read as it is as well.
-    Ground that is darker than ink is in prints may also be uneven by sharpening: bright targets on
-    it that are in doubt still are read nearly in gray values.
+    Ground that is darker than ink is in prints is uneven by light or by sharpening. Bright targets
+    on it that are in doubt, or in uneven light, are read without a lift of black as well, and then
+    nearly in gray values.
     """
-    read = _read_lifted(gray, fit, family, prior, least, PRINTED)
-    some = np.flatnonzero((fit.contrast < BLACK) & (read.confidence >= _POSSIBLE))
+    read = _read_lifted(gray, fit, family, prior, least, lift_ratio(gray, fit, family.band))
+    bright = (fit.polarity < 0) & (read.confidence >= _POSSIBLE)
+    some = np.flatnonzero(bright & (fit.contrast < BLACK))
     if some.size:
-        uneven = in_uneven_light(gray, fit.select(some), family.band)
+        uneven = in_uneven_light(gray, fit.frames[some], family.band)
         some = some[uneven | ~read.certain[some]]
         again = _read_lifted(gray, fit.select(some), family, prior, -np.inf, AS_IT_IS)
         better = again.certain | (again.confidence > read.confidence[some])
         read = read.replaced(some[better], again.select(better))
-    bright = (fit.polarity < 0) & (fit.contrast < PRINTED)
-    some = np.flatnonzero(bright & ~read.certain & (read.confidence >= _POSSIBLE))
-    again = _read_lifted(gray, fit.select(some), family, prior, -np.inf, NEARLY_LINEAR)
-    surer = again.confidence > read.confidence[some]
-    return read.replaced(some[surer], again.select(surer))
+    some = np.flatnonzero(bright & (fit.contrast < PRINTED) & ~read.certain)
+    if some.size:
+        again = _read_lifted(gray, fit.select(some), family, prior, -np.inf, NEARLY_LINEAR)
+        better = again.confidence > read.confidence[some]
+        read = read.replaced(some[better], again.select(better))
+    return read
 
 
 def _read_lifted(
@@ -160,7 +163,7 @@ def _read_lifted(
     family: RingPrint,
     prior: Prior,
     least: np.ndarray | float,
-    ratio: float,
+    ratio: np.ndarray | float,
 ) -> Hypotheses:
     """Return the same with black lifted to a ratio of ink and paper, see `black_lift`."""
     unread = Hypotheses.unread(fit, family)
