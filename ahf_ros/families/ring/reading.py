@@ -140,7 +140,14 @@ def _read_part(
     on it that are in doubt, or in uneven light, are read without a lift of black as well, and then
     nearly in gray values.
     """
-    read = _read_lifted(gray, fit, family, prior, least, lift_ratio(gray, fit, family.band))
+    ratio = lift_ratio(gray, fit, family.band)
+    read = _read_lifted(gray, fit, family, prior, least, ratio)
+    possible = read.confidence >= _POSSIBLE
+    some = np.flatnonzero((ratio == AS_IT_IS) & ~read.certain & possible)
+    if some.size:
+        again = _read_lifted(gray, fit.select(some), family, prior, -np.inf, PRINTED)
+        better = again.confidence > read.confidence[some]
+        read = read.replaced(some[better], again.select(better))
     bright = (fit.polarity < 0) & (read.confidence >= _POSSIBLE)
     some = np.flatnonzero(bright & (fit.contrast < BLACK))
     if some.size:
