@@ -13,6 +13,7 @@ from ahf_ros.base.target import UNDECODED, Target
 from ahf_ros.families.claims import reported
 from ahf_ros.families.contract import ExpectingDetector
 from ahf_ros.families.explained import without_targets
+from ahf_ros.vision.faint import faint_parts
 from ahf_ros.vision.faint_targets import with_faint_targets
 from ahf_ros.vision.image import as_gray, check_image
 from ahf_ros.vision.pyramid import ImagePyramid, image_pyramid
@@ -51,8 +52,8 @@ class PyramidDetector(ExpectingDetector):
     ) -> list[Target]:
         """Return what a search finds in an image, and in its parts of faint contrast.
 
-        Targets that are identified are painted over before parts are looked for: narrow rings
-        have a faint contrast of their own, and would be read twice.
+        Where there are such parts, targets that are identified are painted over before these are
+        looked for: narrow rings have a faint contrast of their own, and would be read twice.
         """
         if not self.stretches:
             return search(pyramid)
@@ -61,6 +62,8 @@ class PyramidDetector(ExpectingDetector):
             return search(image_pyramid(gray, self.settings.max_radius, self.contrast))
 
         found = search(pyramid)
+        if next(faint_parts(pyramid.image), None) is None:
+            return found
         known = [it for it in found if it.id != UNDECODED]
         left = without_targets(pyramid.image, known, self.settings.prints)
         return with_faint_targets(left, found, stretched)

@@ -21,7 +21,7 @@ PRINTED = 0.25
 """Ratio of the gray values of ink and paper in usual prints, to which black is lifted."""
 
 BLACK = PRINTED / (1 + PRINTED)
-"""The same ratio, below which ink is lifted to that of prints."""
+"""Ratio of ink and paper below which black is lifted to that of prints, see `black_lift`."""
 
 AS_IT_IS = 0.0
 """The ratio to which no black is lifted."""

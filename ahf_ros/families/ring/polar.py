@@ -198,8 +198,7 @@ def polar_images(
     radii = np.linspace(INNERMOST, outermost, circles)
     contrast, lift = _appearance(gray, dots, band, ratio)
     values, reach = on_circles(gray, dots.frames, angles_of(count), radii, lift)
-    places = [*(1 + (inner - 1) * GAP), *(outer + MARGIN)]
-    ground = values[:, [np.abs(radii - place).argmin() for place in places]]
+    ground = values[:, [np.abs(radii - place).argmin() for place in _on_ground(band)]]
     apart = 2 * np.pi * inner * dots.size / count
     noise = np.clip(reading_noise(gray, dots.frames, outermost), *_NOISE)
     levels = ground, _later(ground, apart), noise, dots.polarity
@@ -277,6 +276,12 @@ def _unmixed(ratio: np.ndarray, first: np.ndarray, second: np.ndarray | float) -
     return np.asarray(np.maximum(ink, 1 / SATURATED))
 
 
+def _on_ground(band: tuple[float, float]) -> np.ndarray:
+    """Return the radii at which levels are read on the ground beside a band, dot radii."""
+    inner, outer = band
+    return np.append(1 + (inner - 1) * GAP, outer + MARGIN)
+
+
 def lift_ratio(gray: np.ndarray, dots: Fit, band: tuple[float, float]) -> np.ndarray:
     """Return the ratios of ink and paper to which black is lifted, shape (k,).
 
@@ -291,8 +296,7 @@ def lift_ratio(gray: np.ndarray, dots: Fit, band: tuple[float, float]) -> np.nda
 
 def in_uneven_light(gray: np.ndarray, frames: np.ndarray, band: tuple[float, float]) -> np.ndarray:
     """Return whether shadows or patterns lie on the ground of targets, (k, 3, 3), bool, (k,)."""
-    inner, outer = band
-    radii, angles = np.append(1 + (inner - 1) * GAP, outer + MARGIN), angles_of(_PARTS * _READINGS)
+    radii, angles = _on_ground(band), angles_of(_PARTS * _READINGS)
     values, _ = on_circles(gray, frames, angles, radii, np.zeros(len(frames)))
     parts = values.reshape(len(frames), len(radii), _PARTS, _READINGS).mean(axis=(1, 3))
     low, high = np.quantile(np.maximum(parts, 0) + LOG_OFFSET, [0.1, 0.9], axis=1)

@@ -54,7 +54,7 @@ PER_SECTOR = 10
 
 _PROPORTION = 0.06  # by which bands may be larger or smaller beside their dots than printed
 _THIN = 1.5  # width of a band, in deviations of blur, up to which its dot alone is measured
-_POSSIBLE = 0.01  # confidence of a doubtful reading, from which black is lifted by more
+_POSSIBLE = 0.01  # confidence of a doubtful reading, from which black is lifted otherwise
 _SHIFTS = np.arange(-2.4, 2.41, 0.4)  # of edges, that are tried, px
 
 
@@ -136,32 +136,31 @@ def _read_part(
 ) -> Hypotheses:
     """Return what bands are read as in the frames of their drafts; see `read_bands`.
 
+    Black marks in uneven light are read as they are, and those in doubt with the black of prints.
     Ground that is darker than ink is in prints is uneven by light or by sharpening. Bright targets
     on it that are in doubt, or in uneven light, are read without a lift of black as well, and then
     nearly in gray values.
     """
     ratio = lift_ratio(gray, fit, family.band)
     read = _read_lifted(gray, fit, family, prior, least, ratio)
-    possible = read.confidence >= _POSSIBLE
-    some = np.flatnonzero((ratio == AS_IT_IS) & ~read.certain & possible)
-    if some.size:
-        again = _read_lifted(gray, fit.select(some), family, prior, -np.inf, PRINTED)
-        better = again.confidence > read.confidence[some]
-        read = read.replaced(some[better], again.select(better))
+
+    def again(read: Hypotheses, some: np.ndarray, lift: float) -> Hypotheses:
+        """Return what is read, some of it with another lift of black where that makes it surer."""
+        if not some.size:
+            return read
+        other = _read_lifted(gray, fit.select(some), family, prior, -np.inf, lift)
+        surer = other.certain | (other.confidence > read.confidence[some])
+        return read.replaced(some[surer], other.select(surer))
+
+    doubtful = ~read.certain & (read.confidence >= _POSSIBLE)
+    read = again(read, np.flatnonzero(doubtful & (ratio == AS_IT_IS)), PRINTED)
     bright = (fit.polarity < 0) & (read.confidence >= _POSSIBLE)
-    some = np.flatnonzero(bright & (fit.contrast < BLACK))
-    if some.size:
-        uneven = in_uneven_light(gray, fit.frames[some], family.band)
-        some = some[uneven | ~read.certain[some]]
-        again = _read_lifted(gray, fit.select(some), family, prior, -np.inf, AS_IT_IS)
-        better = again.certain | (again.confidence > read.confidence[some])
-        read = read.replaced(some[better], again.select(better))
-    some = np.flatnonzero(bright & (fit.contrast < PRINTED) & ~read.certain)
-    if some.size:
-        again = _read_lifted(gray, fit.select(some), family, prior, -np.inf, NEARLY_LINEAR)
-        better = again.confidence > read.confidence[some]
-        read = read.replaced(some[better], again.select(better))
-    return read
+    black = np.flatnonzero(bright & (fit.contrast < BLACK))
+    if black.size:
+        uneven = in_uneven_light(gray, fit.frames[black], family.band)
+        read = again(read, black[uneven | ~read.certain[black]], AS_IT_IS)
+    some = np.flatnonzero(bright & ~read.certain & (fit.contrast < PRINTED))
+    return again(read, some, NEARLY_LINEAR)
 
 
 def _read_lifted(
