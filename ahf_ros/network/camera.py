@@ -173,7 +173,7 @@ def linearise(
     perspective[:, :, 2] = -ideal
     by_seen = by_ideal @ (perspective / seen[:, 2, None, None])
     by_point = by_seen @ rotation
-    by_rotation = np.cross(seen[:, None, :], by_seen)  # by_seen times -[seen]x
+    by_rotation = by_seen @ skew(-seen)
     return Linearised(
         _imaged(calibration, distorted),
         by_calibration,
@@ -182,14 +182,21 @@ def linearise(
     )
 
 
+def skew(vectors: FloatArray) -> FloatArray:
+    """Return the matrices (n, 3, 3) whose products are cross products with vectors (n, 3)."""
+    matrices = np.zeros((len(vectors), 3, 3))
+    matrices[:, [2, 0, 1], [1, 2, 0]] = vectors
+    matrices[:, [1, 2, 0], [2, 0, 1]] = -vectors
+    return matrices
+
+
 def rotation_matrices(vectors: FloatArray) -> FloatArray:
     """Return the rotations (n, 3, 3) of rotation vectors (n, 3) in rad, by Rodrigues' formula."""
-    angle = np.linalg.norm(vectors, axis=1)[:, None, None]
-    cross = np.zeros((len(vectors), 3, 3))
-    cross[:, [2, 0, 1], [1, 2, 0]] = vectors
-    cross[:, [1, 2, 0], [2, 0, 1]] = -vectors
-    half = np.sinc(angle / (2 * np.pi))
-    return np.eye(3) + np.sinc(angle / np.pi) * cross + half**2 / 2 * (cross @ cross)
+    angle = np.sqrt((vectors**2).sum(axis=1))[:, None, None]
+    over = 1 / np.maximum(angle, np.finfo(float).tiny)
+    cross = skew(vectors)
+    bent = 2 * (np.sin(angle / 2) * over) ** 2
+    return np.eye(3) + np.sin(angle) * over * cross + bent * (cross @ cross)
 
 
 def _rotated(rotation: FloatArray, vectors: FloatArray) -> FloatArray:

@@ -16,6 +16,7 @@ from typing import Literal
 
 import numpy as np
 
+from ahf_ros.network.camera import skew
 from ahf_ros.network.network import FloatArray
 
 
@@ -48,7 +49,7 @@ def movements(points: FloatArray, scale: bool = True) -> FloatArray:
     centred = centred / (size if size > 0 else 1)
     columns = np.zeros((len(points), 3, 7))
     columns[:, :, :3] = np.eye(3)
-    columns[:, :, 3:6] = np.cross(np.eye(3), centred[:, None, :]).transpose(0, 2, 1)
+    columns[:, :, 3:6] = skew(-centred)
     columns[:, :, 6] = centred
     return columns.reshape(-1, 7)[:, : 7 if scale else 6]
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,37 @@ _FEWEST_POINTS = 3  # of a photograph: six coordinates determine a pose
 _FEWEST_RAYS = 2  # of a point
 BEHIND = 1e6  # residual in standard deviations of a point behind the camera
 _MEDIAN = np.sqrt(2 * np.log(2))  # of the length of a normal 2-vector
+
+
+@dataclass(frozen=True)
+class Groups:
+    """Rows grouped by a label: `labels` (g,) in ascending order, and sums of each group."""
+
+    labels: IntArray
+    order: IntArray
+    starts: IntArray
+
+    @classmethod
+    def by(cls, labels: IntArray) -> Groups:
+        """Group rows by labels (m,)."""
+        order = np.argsort(labels, kind='stable')
+        unique, starts = np.unique(labels[order], return_index=True)
+        return cls(unique, order, starts)
+
+    def sum(self, rows: FloatArray) -> FloatArray:
+        """Return the sums (g, ...) of rows (m, ...)."""
+        return np.add.reduceat(rows[self.order], self.starts, axis=0)
+
+
+@dataclass(frozen=True)
+class OfCamera:
+    """The observations of a camera with free parameters, grouped by photographs and by points."""
+
+    free: NDArray[np.bool_]
+    columns: IntArray
+    rows: NDArray[np.bool_]
+    images: Groups
+    points: Groups
 
 
 @dataclass(frozen=True)
@@ -39,12 +71,32 @@ class Layout:
     equidistant: NDArray[np.bool_]
     backward: bool
 
-    @property
+    @cached_property
     def columns(self) -> IntArray:
         """Columns (cameras, parameters) of free parameters after those of points, else -1."""
         columns = np.full(self.free.shape, -1)
         columns[self.free] = 3 * len(self.points) + np.arange(np.count_nonzero(self.free))
         return columns
+
+    @cached_property
+    def images(self) -> Groups:
+        """Observations by photographs."""
+        return Groups.by(self.photograph)
+
+    @cached_property
+    def rays(self) -> Groups:
+        """Observations by points."""
+        return Groups.by(self.point)
+
+    @cached_property
+    def of_cameras(self) -> tuple[OfCamera, ...]:
+        """Observations of each camera with free parameters."""
+        found = []
+        for index in np.flatnonzero(self.free.any(axis=1)):
+            free, rows = self.free[index], self.camera == index
+            groups = (Groups.by(of[rows]) for of in (self.photograph, self.point))
+            found.append(OfCamera(free, self.columns[index, free], rows, *groups))
+        return tuple(found)
 
     @property
     def unknowns(self) -> int:
@@ -128,29 +180,29 @@ def predicted_in_front(network: Network, start: NetworkState) -> NDArray[np.bool
 def residuals(layout: Layout, state: NetworkState) -> FloatArray:
     """Return measured minus computed image points (m, 2) in px; NaN behind the camera."""
     points = state.points[layout.points[layout.point]]
-    return _residuals(layout, state, np.arange(len(layout.xy)), points)
+    return _residuals(layout, state, slice(None), points)
 
 
 def lengths_at(
-    layout: Layout, state: NetworkState, rows: IntArray, points: FloatArray
+    layout: Layout, state: NetworkState, rows: IntArray | slice, points: FloatArray
 ) -> FloatArray:
     """Return the residuals' lengths (n,) in standard deviations, were points (n, 3) those of rows.
 
     They are `BEHIND` where a point is behind the camera.
     """
     whitened = layout.whitening[rows] @ _residuals(layout, state, rows, points)[:, :, None]
-    lengths = np.linalg.norm(whitened[:, :, 0], axis=1)
-    return np.nan_to_num(lengths, nan=BEHIND, posinf=BEHIND)
+    lengths = np.sqrt((whitened[:, :, 0] ** 2).sum(axis=1))
+    return np.where(np.isfinite(lengths), lengths, BEHIND)
 
 
 def whitened_lengths(layout: Layout, state: NetworkState) -> FloatArray:
     """Return the residuals' lengths (m,) in standard deviations, `BEHIND` behind the camera."""
     points = state.points[layout.points[layout.point]]
-    return lengths_at(layout, state, np.arange(len(layout.xy)), points)
+    return lengths_at(layout, state, slice(None), points)
 
 
 def _residuals(
-    layout: Layout, state: NetworkState, rows: IntArray, points: FloatArray
+    layout: Layout, state: NetworkState, rows: IntArray | slice, points: FloatArray
 ) -> FloatArray:
     photographs = layout.photographs[layout.photograph[rows]]
     computed = camera.project(

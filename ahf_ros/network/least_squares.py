@@ -28,7 +28,7 @@ import numpy as np
 from ahf_ros.network import image_points
 from ahf_ros.network.camera import rotation_matrices
 from ahf_ros.network.image_points import Design, Layout
-from ahf_ros.network.network import FloatArray, IntArray
+from ahf_ros.network.network import FloatArray
 from ahf_ros.network.progress import iteration
 from ahf_ros.network.solution import NetworkState
 
@@ -40,26 +40,6 @@ _CONVERGED = 1e-9  # decrease of the sum of weighted squares that a step promise
 _ROBUST_CONVERGED = 1e-2  # ... under a robust loss, which only prepares tests
 _ROUNDING = 1e-13  # ... relative to the sum
 _TUNING = 3.0  # standard deviations at which robust weights fall
-
-
-@dataclass(frozen=True)
-class Groups:
-    """Rows grouped by a label: `labels` (g,) in ascending order, and sums of each group."""
-
-    labels: IntArray
-    order: IntArray
-    starts: IntArray
-
-    @classmethod
-    def by(cls, labels: IntArray) -> Groups:
-        """Group rows by labels (m,)."""
-        order = np.argsort(labels, kind='stable')
-        unique, starts = np.unique(labels[order], return_index=True)
-        return cls(unique, order, starts)
-
-    def sum(self, rows: FloatArray) -> FloatArray:
-        """Return the sums (g, ...) of rows (m, ...)."""
-        return np.add.reduceat(rows[self.order], self.starts, axis=0)
 
 
 @dataclass(frozen=True)
@@ -141,11 +121,10 @@ def minimise(
     """
     damping = _FIRST_DAMPING
     enough = _CONVERGED if loss == 'squares' else _ROBUST_CONVERGED
+    lengths, conditions = image_points.whitened_lengths(layout, state), knowledge(state)
     for number in range(rounds):
         iteration(number + 1)
-        lengths = image_points.whitened_lengths(layout, state)
         spread = 1.0 if loss == 'squares' else max(1.0, image_points.robust_spread(lengths))
-        conditions = knowledge(state)
         weights = _losses(lengths, spread, loss)[1]
         equations = assemble(layout, image_points.linearise(layout, state), weights)
         equations = conditions.added(equations)
@@ -161,13 +140,11 @@ def minimise(
             if abs(promised) < enough * spread**2 + _ROUNDING * before:
                 return changed(layout, state, poses, rest), True
             trial = changed(layout, state, poses, rest)
-            known = knowledge(trial)
-            after = (
-                _losses(image_points.whitened_lengths(layout, trial), spread, loss)[0] + known.cost
-            )
+            known, away = knowledge(trial), image_points.whitened_lengths(layout, trial)
+            after = _losses(away, spread, loss)[0] + known.cost
             penalty = 2 * np.abs(multipliers)  # of what has to hold exactly [2]_
             if after + penalty @ np.abs(known.border()[1]) < before + penalty @ np.abs(gaps):
-                state = trial
+                state, lengths, conditions = trial, away, known
                 break
             rejected = True
             damping *= 10
@@ -248,8 +225,7 @@ def assemble(layout: Layout, design: Design, weights: FloatArray) -> Normals:
         for part in (design.by_pose, design.by_point, design.by_calibration)
     )
     right = root * design.misclosure[:, :, None]
-    images = Groups.by(layout.photograph)
-    rays = Groups.by(layout.point)
+    images, rays = layout.images, layout.rays
     count, unknowns = len(layout.photographs), layout.unknowns
     coordinates = np.arange(3 * len(layout.points)).reshape(-1, 3)
 
@@ -263,19 +239,14 @@ def assemble(layout: Layout, design: Design, weights: FloatArray) -> Normals:
     rest_right = np.zeros(unknowns)
     rest[coordinates[:, :, None], coordinates[:, None, :]] = rays.sum(products(point, point))
     rest_right[coordinates] = rays.sum(products(point, right)[:, :, 0])
-    columns = layout.columns
-    for index in np.flatnonzero(layout.free.any(axis=1)):
-        free = layout.free[index]
-        own = columns[index, free]
-        mine = layout.camera == index
-        part = calibration[mine][:, :, free]
-        of_images = Groups.by(layout.photograph[mine])
-        mixed[of_images.labels[:, None, None], np.arange(6)[:, None], own] = of_images.sum(
+    for one in layout.of_cameras:
+        mine, own = one.rows, one.columns
+        part = calibration[mine][:, :, one.free]
+        mixed[one.images.labels[:, None, None], np.arange(6)[:, None], own] = one.images.sum(
             products(pose[mine], part)
         )
-        of_points = Groups.by(layout.point[mine])
-        block = of_points.sum(products(point[mine], part)).reshape(-1, len(own))
-        rows = coordinates[of_points.labels].reshape(-1)
+        block = one.points.sum(products(point[mine], part)).reshape(-1, len(own))
+        rows = coordinates[one.points.labels].reshape(-1)
         rest[rows[:, None], own] = block
         rest[own[:, None], rows] = block.T
         flat = part.reshape(-1, len(own))
@@ -369,6 +340,8 @@ def bordered(reduced: Reduced, border: FloatArray) -> tuple[FloatArray, FloatArr
     columns = columns / size
     if columns.size and np.linalg.matrix_rank(columns) < len(size):
         raise np.linalg.LinAlgError('columns of the border depend on each other')
-    empty = np.zeros((border.shape[1], border.shape[1]))
-    scaled = scale[:, None] * reduced.matrix * scale
-    return np.block([[scaled, columns], [columns.T, empty]]), size
+    unknowns, every = len(scale), len(scale) + len(size)
+    matrix = np.zeros((every, every))
+    matrix[:unknowns, :unknowns] = scale[:, None] * reduced.matrix * scale
+    matrix[:unknowns, unknowns:], matrix[unknowns:, :unknowns] = columns, columns.T
+    return matrix, size

@@ -11,6 +11,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from ahf_ros.network.camera import skew
 from ahf_ros.network.network import FloatArray
 from ahf_ros.network.triangulation import midpoints
 
@@ -151,7 +152,7 @@ def _improved(
 
     def error(step: FloatArray) -> FloatArray:
         turn, base = moved(step)
-        return sampson_errors(np.cross(np.eye(3), -base) @ turn, first, second)
+        return sampson_errors(skew(-base[None])[0] @ turn, first, second)
 
     residuals = error(np.zeros(5))
     scale = _least_median_scale(residuals, 5, sigma)

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 
 import cv2
 import numpy as np
@@ -89,18 +90,27 @@ def _half(number: int) -> int:
     return min(number, number // 2 + 2)
 
 
-def _sampled(points: FloatArray, xy: FloatArray) -> Iterable[Pose]:
-    """Yield the poses of P3P of samples of three points, always the same samples."""
+@cache
+def _samples(number: int) -> NDArray[np.intp]:
+    """Return samples of three of so many points, (SAMPLES, 3), always the same."""
     random = np.random.default_rng(3)
-    for _ in range(SAMPLES):
-        three = random.choice(len(points), 3, replace=False)
+    return np.array([random.choice(number, 3, replace=False) for _ in range(SAMPLES)])
+
+
+def _sampled(points: FloatArray, xy: FloatArray) -> list[Pose]:
+    """Return the poses of P3P of samples of three points."""
+    moved = []  # rotation vectors and shifts
+    for three in _samples(len(points)):
         flags = cv2.SOLVEPNP_P3P
-        count, turns, shifts = cv2.solveP3P(points[three], xy[three], np.eye(3), None, flags)
-        for turn, shift in zip(turns[:count], shifts[:count], strict=True):
-            rotation = np.asarray(cv2.Rodrigues(turn)[0], float)
-            position = -rotation.T @ shift.ravel()
-            if np.isfinite(rotation).all() and np.isfinite(position).all():
-                yield rotation, position
+        count, *found = cv2.solveP3P(points[three], xy[three], np.eye(3), None, flags)
+        moved += [np.ravel(of) for of in zip(*found, strict=True)][:count]
+    if not moved:
+        return []
+    turns, shifts = np.hsplit(np.array(moved), 2)
+    rotations = rotation_matrices(turns)
+    positions = -(shifts[:, None] @ rotations)[:, 0]
+    finite = np.isfinite(rotations).all(axis=(1, 2)) & np.isfinite(positions).all(axis=1)
+    return list(zip(rotations[finite], positions[finite], strict=True))
 
 
 def _distinct(poses: Iterable[Pose], points: FloatArray, least: float, most: int) -> list[Pose]:
@@ -132,7 +142,7 @@ def _improved(
     count, number = len(poses), len(points)
     before = np.full(count, np.inf)
     for _ in range(ROUNDS):
-        seen = np.einsum('kij,knj->kni', rotations, points - positions[:, None])
+        seen = (points - positions[:, None]) @ rotations.transpose(0, 2, 1)
         front = seen[..., 2] > 0
         inverse = 1 / np.where(front, seen[..., 2], np.inf)
         image = seen[..., :2] * inverse[..., None]
@@ -145,14 +155,15 @@ def _improved(
         if np.all(np.abs(before - cost) <= 1e-6 * cost):
             break
         before = cost
-        ray = np.zeros((count, number, 2, 3))
-        ray[..., 0, 0] = ray[..., 1, 1] = inverse
-        ray[..., 2] = -image * inverse[..., None]
         # A small turn w in the camera's frame moves X_camera by w x X_camera.
-        turn = np.cross(seen[:, :, None], ray)
-        jacobian = np.concatenate([turn, -ray @ rotations[:, None]], axis=3)
-        jacobian *= (weight / sigma)[..., None, None]
-        jacobian = jacobian.reshape(count, 2 * number, 6)
+        x, y = image[..., 0], image[..., 1]
+        by_pose = np.zeros((count, number, 2, 6))
+        by_pose[..., 0, :3] = np.stack([-x * y, 1 + x**2, -y], axis=-1)
+        by_pose[..., 1, :3] = np.stack([-1 - y**2, x * y, x], axis=-1)
+        across = image[..., None] * rotations[:, None, None, 2]
+        by_pose[..., 3:] = (across - rotations[:, None, :2]) * inverse[..., None, None]
+        by_pose *= (weight / sigma)[..., None, None]
+        jacobian = by_pose.reshape(count, 2 * number, 6)
         transposed = jacobian.transpose(0, 2, 1)
         normal = transposed @ jacobian
         diagonal = np.arange(6)
