@@ -29,7 +29,7 @@ from ahf_ros.families.contract import DetectorSettings
 from ahf_ros.families.learning.rings import LearntFamily, learn_families
 from ahf_ros.families.ring.bands import DotsOfOctave, bands_about, dots_in
 from ahf_ros.identification.settling import evident, still_shown
-from ahf_ros.prints import SQUARE_NAMES
+from ahf_ros.prints import RING_NAMES, SQUARE_NAMES
 from ahf_ros.prints.families import AUTO, prints_of
 from ahf_ros.prints.ring import FAMILY_NAMES, RingPrint, words_of_print
 from ahf_ros.prints.square import has_dictionary
@@ -75,7 +75,7 @@ def advice(image: np.ndarray, settings: DetectorSettings, expected_targets: int 
     >>> advice(render(scene).image, DetectorSettings(family='metashape12'))
     ['3 targets of aicon14: --family aicon14']
     """
-    return _advice(image, _part(image, settings), settings, expected_targets)
+    return _advice(image, _Part(image, settings), settings, expected_targets)
 
 
 def advice_on_all(
@@ -88,36 +88,50 @@ def advice_on_all(
     one do not. Images of many dots, as of texture, do not count. No image is asked for twice. The
     other arguments are as for `advice`.
     """
-    parts: list[np.ndarray] = []
+    parts: list[_Part] = []
     for name, image in islice(images, TOGETHER):
-        parts.append(_part(image, settings))
+        parts.append(_Part(image, settings))
         if len(parts) > LOOKED_AT:
             continue
         if lines := _advice(image, parts[-1], settings, expected_targets):
             return [f'{name}: {line}' for line in lines]
-    dots = [of for part in parts if _are_few(of := dots_in(part, settings))]
+    dots = [of for part in parts if _are_few(of := part.dots(settings))]
     if len(parts) < 2 or not (learnt := _learnt(dots)):
         return []
     lines = list(filter(None, _of_bands(learnt, 1, settings, expected_targets)))
     return [f'{len(parts)} images together: {line}' for line in lines]
 
 
-def _part(image: np.ndarray, settings: DetectorSettings) -> np.ndarray:
-    """Return the part of an image that gets a second look."""
-    check_image(image)
-    return _with_most_dots(as_gray(image), _MAXIMUM_PIXELS, settings)
+class _Part:
+    """The part of an image that gets a second look; its dots are looked for once."""
+
+    def __init__(self, image: np.ndarray, settings: DetectorSettings) -> None:
+        check_image(image)
+        self.gray = _with_most_dots(as_gray(image), _MAXIMUM_PIXELS, settings)
+        self.is_whole = self.gray.size == image.size
+        self._dots: dict[tuple[object, ...], list[DotsOfOctave]] = {}
+
+    def dots(self, settings: DetectorSettings | None = None) -> list[DotsOfOctave]:
+        """Return the dots of the usual settings, or of other ones, that may have bands."""
+        rings = (settings or DetectorSettings()).narrowed(RING_NAMES)
+        kind = rings.radii, rings.polarities
+        if kind not in self._dots:
+            self._dots[kind] = dots_in(self.gray, rings)
+        return self._dots[kind]
 
 
 def _advice(
-    image: np.ndarray, part: np.ndarray, settings: DetectorSettings, expected: int
+    image: np.ndarray, part: _Part, settings: DetectorSettings, expected: int
 ) -> list[str]:
     """Return what a part of an image says, or else the whole of it."""
-    dots = dots_in(part, DetectorSettings())
-    lines = list(filter(None, _lines(part, dots, settings, expected)))
-    if not lines and part.size < image.size:
+    lines = list(filter(None, _lines(part, settings, expected)))
+    if not lines and not part.is_whole:
         lines = list(filter(None, _of_whole(as_gray(image), settings, expected)))
-    if not lines and _count(dots) <= _MOST:
-        lines = list(filter(None, _of_dozens(as_gray(image), settings, expected)))
+    count = _count(part.dots())
+    every = part.is_whole and count <= _CLEAREST  # have been looked at
+    if not lines and not every and count <= _MOST:
+        whole = part if part.is_whole else None
+        lines = list(filter(None, _of_dozens(as_gray(image), whole, settings, expected)))
     return lines
 
 
@@ -151,9 +165,8 @@ class Adviser:
             self.lines = lines if self._in_a_row else []
 
 
-def _lines(
-    image: np.ndarray, dots: list[DotsOfOctave], settings: DetectorSettings, expected: int
-) -> Iterator[str]:
+def _lines(part: _Part, settings: DetectorSettings, expected: int) -> Iterator[str]:
+    image, dots = part.gray, part.dots()
     few = _are_few(dots)
     read = _read(image, settings) if few else []
     if repeated := repeated_targets(read):
@@ -198,12 +211,15 @@ def _of_whole(gray: np.ndarray, settings: DetectorSettings, expected: int) -> It
         yield next(_of_others(reduced, settings), '')  # of edges it tells little
 
 
-def _of_dozens(gray: np.ndarray, settings: DetectorSettings, expected: int) -> Iterator[str]:
+def _of_dozens(
+    gray: np.ndarray, part: _Part | None, settings: DetectorSettings, expected: int
+) -> Iterator[str]:
     """Yield what the rings of a whole image show, where they leave no doubt."""
     times = max(1, ceil((gray.size / _WHOLE) ** 0.5))
     if times > 1:
         gray = cv2.resize(gray, None, fx=1 / times, fy=1 / times, interpolation=cv2.INTER_AREA)
-    learnt = _learnt([dots_in(gray, DetectorSettings())], _DOZENS)
+    dots = part.dots() if part else dots_in(gray, DetectorSettings())
+    learnt = _learnt([dots], _DOZENS)
     if learnt and learnt.lead > _BEYOND_DOUBT:
         yield from _of_bands(learnt, 1 / times, settings, expected)
 
