@@ -127,17 +127,22 @@ static void normal_equations(count m, const double places[m], bool grows, enum w
         for (int v = 0; v < UNKNOWNS; v++)
             normal[u][v] = 0;
     for (count a = 0; a < m; a++) {
+        count n = 0; /* samples of the row that count */
         set_rows(m, a, places, grows, unknowns, fields, rows);
         for (count b = 0; b < m; b++) {
             double weight = weight_at(m, fields, a, b, weighing), value = fields[field][a][b];
+            if (!fields[INSIDE][a][b])
+                continue;
             for (int u = 0; u < UNKNOWNS; u++) {
-                weighted[b][u] = weight * rows[b][u];
-                sums[u] += weighted[b][u] * value;
+                rows[n][u] = rows[b][u];
+                weighted[n][u] = weight * rows[b][u];
+                sums[u] += weighted[n][u] * value;
             }
+            n++;
         }
         for (int u = first; u < UNKNOWNS; u += TILE)
             for (int v = u; v < UNKNOWNS; v += TILE)
-                add_tile(m, rows, weighted, u, v, normal);
+                add_tile(n, rows, weighted, u, v, normal);
     }
     for (int u = first; u < UNKNOWNS; u++) {
         right[u] = sums[u];
@@ -213,9 +218,12 @@ static void sample_values(count h, count w, count m, const float gray[h][w],
 {
     for (count a = 0; a < m; a++)
         for (count b = 0; b < m; b++) {
+            fields[INSIDE][a][b] = fields[VALUE][a][b] = 0;
+            if (!fields[KNOWN][a][b])
+                continue;
             double at[2];
             projected(frame, places[b], places[a], at);
-            fields[INSIDE][a][b] = fields[KNOWN][a][b] && at[0] >= 0 && at[1] >= 0 &&
+            fields[INSIDE][a][b] = at[0] >= 0 && at[1] >= 0 &&
                                    at[0] <= (double)(w - 1) && at[1] <= (double)(h - 1);
             fields[VALUE][a][b] = value_at(h, w, gray, at[0], at[1]);
         }

@@ -71,12 +71,12 @@ static double step_of_sides(count t, count s, count m, const double steps[2][t][
     return middle(n, sides);
 }
 
-/* Logarithmic odds, up to what is the same for all kinds, of a step, as a share of the usual one:
-   light makes any step of some. */
-static inline double odds_of(double share, int kind, double deviation, double stray)
+/* Likelihood, up to what is the same for all kinds, of a step, as a share of the usual one: light
+   makes any step of some. */
+static inline double likelihood_of(double share, int kind, double deviation, double stray)
 {
     double away = (share - (kind - SAME)) / deviation;
-    return logarithm(exponential(-away * away / 2) + stray);
+    return exponential(-away * away / 2) + stray;
 }
 
 /* Logarithmic odds of all kinds of a line between two cells, against what else may be there. */
@@ -86,9 +86,10 @@ static void set_odds(count m, const double steps[m], double usual, double deviat
     static const double expected[KINDS] = {0.25, 0.5, 0.25};
     double any = 0;
     for (int kind = 0; kind < KINDS; kind++) {
-        odds[kind] = 0;
+        double likelihood = 1;
         for (count i = 0; i < m; i++)
-            odds[kind] += weight * odds_of(steps[i] / usual, kind, deviation, stray);
+            likelihood *= likelihood_of(steps[i] / usual, kind, deviation, stray);
+        odds[kind] = weight * logarithm(likelihood);
     }
     for (int kind = 0; kind < KINDS; kind++)
         any += expected[kind] * exponential(odds[kind] - odds[SAME]);
@@ -129,7 +130,7 @@ void step_evidence(count h, count w, rows k, count s, count t, count n, count f,
 {
     count border = (s - n) / 2;
     for (count i = 0; i < k; i++) {
-        double ink = 0, around = 0, shown[2], blurs[2];
+        double ink = 0, around = 0, shown[2], blurs[2], spread[2];
         for (int axis = 0; axis < 2; axis++)
             blurs[axis] = corner[1] / sizes[i][axis];
         memset(features[i], 0, sizeof features[i]);
@@ -137,27 +138,29 @@ void step_evidence(count h, count w, rows k, count s, count t, count n, count f,
                   steps);
         double usual = step_of_sides(t, s, m, steps, sides[0][0]);
         seen[i] = usual > least;
-        for (int axis = 0; axis < 2 && seen[i]; axis++) {
-            double mixed = normal_share(-aside / blurs[axis]);
-            double spread = deviation[0] + deviation[1] * mixed;
-            for (count line = 0; line < t; line++)
-                for (count cell = 0; cell < s; cell++) {
-                    double of[KINDS];
-                    const double *own = steps[axis][line][cell];
-                    set_odds(m, own, usual, spread, stray, weight, of);
-                    int outer = line == 0 ? FALLING : line == t - 1 ? RISING : SAME;
-                    count column = line - border, row = cell - border;
-                    if (row >= 0 && row < n && column >= 0 && column <= n) {
+        for (int axis = 0; axis < 2; axis++)
+            spread[axis] = deviation[0] + deviation[1] * normal_share(-aside / blurs[axis]);
+        /* What is inside tells nothing where there is no border. */
+        for (int inside = 0; inside < 2 && seen[i] && (!inside || around > 0); inside++)
+            for (int axis = 0; axis < 2; axis++)
+                for (count line = 0; line < t; line++)
+                    for (count cell = 0; cell < s; cell++) {
+                        count column = line - border, row = cell - border;
+                        if (inside != (row >= 0 && row < n && column >= 0 && column <= n))
+                            continue;
+                        double of[KINDS];
+                        const double *own = steps[axis][line][cell];
+                        set_odds(m, own, usual, spread[axis], stray, weight, of);
+                        if (!inside) {
+                            around += of[line == 0 ? FALLING : line == t - 1 ? RISING : SAME];
+                            continue;
+                        }
                         count at = 2 * (((count)axis * (n + 1) + column) * n + row);
                         ink += of[SAME];
                         for (int rises = 0; rises < 2 && at + rises < f; rises++)
                             features[i][at + rises] =
                                 (float)(of[rises ? RISING : FALLING] - of[SAME]);
-                        continue;
                     }
-                    around += of[outer];
-                }
-        }
         odds[INK][i] = ink + of_border * around;
         for (int axis = 0; axis < 2; axis++)
             shown[axis] = normal_share(corner[0] / blurs[axis]);

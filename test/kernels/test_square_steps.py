@@ -114,11 +114,10 @@ def plainly(
     return usual, odds, square
 
 
-@pytest.mark.parametrize('border', [1, 2])
-@pytest.mark.parametrize('seed', range(4))
-def test_evidence_of_steps(seed: int, border: int) -> None:
-    gray, frame, sizes, cells = shown(seed, border)
-    side = INSIDE + 2 * border
+def evidence(
+    gray: np.ndarray, frame: np.ndarray, sizes: np.ndarray, side: int
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return what the kernel says of one quadrilateral."""
     seen, features, odds, *_ = kernels.step_evidence(
         gray,
         frame[None],
@@ -138,6 +137,15 @@ def test_evidence_of_steps(seed: int, border: int) -> None:
         n=INSIDE,
         f=4 * INSIDE * (INSIDE + 1),
     )
+    return seen, features, odds
+
+
+@pytest.mark.parametrize('border', [1, 2])
+@pytest.mark.parametrize('seed', range(4))
+def test_evidence_of_steps(seed: int, border: int) -> None:
+    gray, frame, sizes, cells = shown(seed, border)
+    side = INSIDE + 2 * border
+    seen, features, odds = evidence(gray, frame, sizes, side)
     usual, plain, square = plainly(gray, frame, sizes, side)
     assert seen == (usual > LEAST)
     ink, around, expected, shows = 0.0, 0.0, [], 0.0
@@ -155,3 +163,14 @@ def test_evidence_of_steps(seed: int, border: int) -> None:
     np.testing.assert_allclose(features[0], expected, atol=1e-4)
     np.testing.assert_allclose(odds[:, 0], [ink + OF_BORDER * around, square, around], atol=1e-9)
     assert shows > 0  # of the cells that it has, under stripes five times as bright as others
+
+
+@pytest.mark.parametrize(('seed', 'off'), [(0, 0.1), (1, 0.15), (2, 0.12)])
+def test_cells_tell_nothing_where_there_is_no_border(seed: int, off: float) -> None:
+    gray, frame, sizes, _ = shown(seed, 1)
+    beside = frame @ np.array([[1, 0, off], [0, 1, 0], [0, 0, 1]])
+    seen, features, (ink, _, around) = evidence(gray, beside, sizes, INSIDE + 2)
+    assert seen.all()
+    assert around < 0
+    assert ink == OF_BORDER * around
+    assert not features.any()
