@@ -18,7 +18,15 @@ static inline double held(double x, double low, double high)
     return lesser(greater(x, low), high);
 }
 
-/* Share of a normal distribution below x deviations, as `normal_share`, for which e^(-x^2 / 2) is
+/* e^(-x^2 / 2), and 0 where it is less than 1e-17: processors take a hundred times as long for
+   products below 1e-38. */
+static inline float bell_f(float x)
+{
+    float square = x * x;
+    return square < 78.0f ? exponential_f(-0.5f * square) : 0.0f;
+}
+
+/* Share of a normal distribution below x deviations, as `normal_share`, for which `bell_f` is
    known. */
 static inline float normal_share_f(float x, float power)
 {
@@ -60,7 +68,7 @@ static inline void add_steps(count q, const struct edge *by, float height, const
         float across = by->cosine * x[i] + by->sine * y[i] - by->offset;
         float along = by->cosine * y[i] - by->sine * x[i];
         float away = (across - by->half * (across * across + along * along)) * by->narrow;
-        float share = normal_share_f(away, exponential_f(-0.5f * away * away));
+        float share = normal_share_f(away, bell_f(away));
         sum[i] += gain * logarithm_f(1 + by->more * share);
     }
 }

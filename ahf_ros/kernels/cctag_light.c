@@ -148,8 +148,7 @@ void cctag_edges(rows k, count m, count n, const float values[k][m][n],
                         float across = by.cosine * x[p] + by.sine * y[p] - by.offset;
                         float along = by.cosine * y[p] - by.sine * x[p];
                         away[p] = across - by.half * (across * across + along * along);
-                        power[p] = exponential_f(-0.5f * (away[p] * by.narrow) *
-                                                 (away[p] * by.narrow));
+                        power[p] = bell_f(away[p] * by.narrow);
                     }
                     for (count p = 0; p < q; p++) {
                         float share = normal_share_f(away[p] * by.narrow, power[p]);

@@ -123,7 +123,7 @@ static void light_on(count n, const struct camera *camera, const struct formed *
             away[q] = (across - half * (across * across + along * along)) * narrow;
         }
         for (count q = 0; q < n; q++) {
-            float power = exponential_f(-0.5f * away[q] * away[q]);
+            float power = bell_f(away[q]);
             float share = normal_share_f(away[q], power), own = 1 + more * share;
             light[q] *= own;
             density[q] = power / own * steep;

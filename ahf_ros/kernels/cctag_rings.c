@@ -19,7 +19,7 @@ static void add_circles(count c, count n, const double circles[c], double size, 
         float radius = (float)(fabs(circles[i]) * size + sign * shift);
         for (count j = 0; j < n; j++) {
             float away = (radius - sqrtf(along[j] * along[j] + moved) * wide) * over;
-            float power = exponential_f(-0.5f * away * away);
+            float power = bell_f(away);
             float density = share * sign * power * 0.39894228f;
             inks[0][j] += share * sign * normal_share_f(away, power);
             inks[1][j] -= density * wide * over;
