@@ -114,9 +114,8 @@ SHARED = --ignore test/benchmarks --ignore test/bag --ignore test/batch --ignore
 
 # The oldest versions of numpy and OpenCV that are to be had, and no ROS. No vector units beyond
 # those that both were compiled for: other last bits than those of the tests above. What lasts long
-# is tested with the newest versions only.
-test-oldest: $(OLDEST)/ready
-	$(OLDEST)/bin/python scripts/build_kernels.py
+# is tested with the newest versions only. The kernels are those that $(VENV) has compiled.
+test-oldest: $(OLDEST)/ready $(INSTALLED)
 	$(OLDEST)/bin/python -m support.vector_units baseline $(OLDEST)/bin/python -m pytest \
 		-m 'not lasting' $(SHARED)
 
