@@ -74,6 +74,24 @@ def drivers() -> str:
     return table(rows)
 
 
+def strangers() -> str:
+    """Return how many targets are read in photographs by strangers."""
+    rows = results('photographs')['rows']
+
+    def share(way: str) -> str:
+        some = [of for of in rows if way in of['by']]
+        right = sum(of['by'][way]['right'] for of in some)
+        return f'{right} of {sum(of["expected"] for of in some)}'
+
+    repositories = len({of['repository'] for of in rows})
+    return (
+        f'[figures/photographs.md](figures/photographs.md) has all {len(rows)} photographs of '
+        f'{repositories} repositories: {share("named")}\n'
+        f'targets are read with their family named, and {share("auto")} without; '
+        'it names what is missed.\n'
+    )
+
+
 def driver_settings() -> str:
     """Return what is to be set for each driver, in the node and in the driver."""
     rows: list[tuple[str, ...]] = [
@@ -146,18 +164,22 @@ def limits(head: str, rows: dict[str, str]) -> str:
 
 def disturbed(name: str, file: str = 'disturbances') -> str:
     """Return one of the tables of `benchmarks.disturbances`."""
-    report = json.loads((ROOT / 'docs' / 'figures' / f'{file}.json').read_text())
     counts = {
         row: {column: Count(**of) for column, of in cells.items()}
-        for row, cells in report[name].items()
+        for row, cells in results(file)[name].items()
     }
     return markdown(name, counts) + '\n'
 
 
 def read(name: str) -> dict[tuple[str, str], dict[str, Any]]:
     """Return the rows of a benchmark by group and name."""
-    report = json.loads((ROOT / 'docs' / 'figures' / f'{name}.json').read_text())
-    return {(row['group'], row['name']): row for row in report['rows']}
+    return {(row['group'], row['name']): row for row in results(name)['rows']}
+
+
+def results(name: str) -> dict[str, Any]:
+    """Return what a benchmark recorded."""
+    recorded: dict[str, Any] = json.loads((ROOT / 'docs/figures' / f'{name}.json').read_text())
+    return recorded
 
 
 def cell(of: dict[str, Any] | None) -> str:
@@ -187,6 +209,7 @@ PAGES: dict[str, dict[str, Callable[[], str]]] = {
         'radii': partial(limits, 'radius of the dot, ambient light', RADII),
         'angles': partial(limits, 'angle, ambient light', ANGLES),
         'blurs': partial(limits, 'blur, ambient light', BLURS),
+        'strangers': strangers,
     },
     'docs/parameters.md': {'parameters': parameters},
     'docs/pose.md': {'parameters of pose': partial(parameters, PoseNodeSettings)},
