@@ -22,7 +22,7 @@ from ahf_ros.families.square.frames import Places, centres, side_lengths
 from ahf_ros.families.square.margins import decision_margins
 from ahf_ros.families.square.prints import lay_outlines, lay_prints
 from ahf_ros.families.square.quadrilaterals import find_quadrilaterals
-from ahf_ros.families.square.reading import MINIMUM_ODDS, NOTHING, Readings, bordered, read
+from ahf_ros.families.square.reading import MINIMUM_ODDS, NOTHING, Readings, read
 from ahf_ros.families.undecoded import undecoded
 from ahf_ros.prints.square import are_plain, words
 from ahf_ros.vision.faint import faint_parts
@@ -112,7 +112,7 @@ class SquareDetector(ExpectingDetector):
         found = [NOTHING]
         halves = halved(gray, levels)
         for level, half in enumerate(halves):
-            corners = bordered(half, find_quadrilaterals(half, small=not level))
+            corners = find_quadrilaterals(half, small=not level)
             if level:  # where light, a lens or enlargement spreads edges
                 corners = corners[~_are_read(_enlarged(corners, level), Readings.joined(found))]
             small = np.linalg.norm(corners[:, 2] - corners[:, 0], axis=1) < _SMALL

@@ -117,11 +117,6 @@ def read(
     return readings.select(shown | everything & readings.whole)
 
 
-def bordered(gray: np.ndarray, corners: np.ndarray) -> np.ndarray:
-    """Return quadrilaterals, shape (k, 4, 2), but those that have no dark border, (n, 4, 2)."""
-    return corners[_dark_inside(gray, square_frames(corners), _DEPTH)]
-
-
 def _seen(
     gray: np.ndarray,
     frames: np.ndarray,
