@@ -82,11 +82,15 @@ def _cells(of: dict[str, Any] | None) -> tuple[object, ...]:
 
 def _total(rows: Sequence[dict[str, Any]], way: str) -> str:
     some = [of for of in rows if way in of['by']]
-    right, wrong, false = (
-        sum(of['by'][way][name] for of in some) for name in ('right', 'wrong', 'false')
-    )
-    expected = sum(of['expected'] for of in some)
-    return f'{way}: {right} of {expected} right, {wrong} wrong, {false} false in {len(some)}.'
+    wrong, false = (sum(of['by'][way][name] for of in some) for name in ('wrong', 'false'))
+    return f'{way}: {share(rows, way)} right, {wrong} wrong, {false} false in {len(some)}.'
+
+
+def share(rows: Sequence[dict[str, Any]], way: str) -> str:
+    """Return how many targets are right, and of how many, in the pictures read in a way."""
+    some = [of for of in rows if way in of['by']]
+    right = sum(of['by'][way]['right'] for of in some)
+    return f'{right} of {sum(of["expected"] for of in some)}'
 
 
 def measure(options: argparse.Namespace) -> report.Report:

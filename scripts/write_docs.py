@@ -17,6 +17,7 @@ from ahf_ros.nodes.drivers import DRIVERS
 from ahf_ros.nodes.interfaces import NODES
 from ahf_ros.nodes.settings import DetectorNodeSettings, PoseNodeSettings
 from benchmarks.disturbances import TABLES, Count, markdown
+from benchmarks.photographs import share
 from support.pictures.lights import EVERY_LIGHT
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -77,17 +78,11 @@ def drivers() -> str:
 def strangers() -> str:
     """Return how many targets are read in photographs by strangers."""
     rows = results('photographs')['rows']
-
-    def share(way: str) -> str:
-        some = [of for of in rows if way in of['by']]
-        right = sum(of['by'][way]['right'] for of in some)
-        return f'{right} of {sum(of["expected"] for of in some)}'
-
     repositories = len({of['repository'] for of in rows})
     return (
         f'[figures/photographs.md](figures/photographs.md) has all {len(rows)} photographs of '
-        f'{repositories} repositories: {share("named")}\n'
-        f'targets are read with their family named, and {share("auto")} without; '
+        f'{repositories} repositories: {share(rows, "named")}\n'
+        f'targets are read with their family named, and {share(rows, "auto")} without; '
         'it names what is missed.\n'
     )
 

@@ -130,9 +130,9 @@ static void normal_equations(count m, const double places[m], bool grows, enum w
         count n = 0; /* samples of the row that count */
         set_rows(m, a, places, grows, unknowns, fields, rows);
         for (count b = 0; b < m; b++) {
-            double weight = weight_at(m, fields, a, b, weighing), value = fields[field][a][b];
             if (!fields[INSIDE][a][b])
                 continue;
+            double weight = weight_at(m, fields, a, b, weighing), value = fields[field][a][b];
             for (int u = 0; u < UNKNOWNS; u++) {
                 rows[n][u] = rows[b][u];
                 weighted[n][u] = weight * rows[b][u];

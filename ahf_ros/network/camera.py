@@ -183,10 +183,10 @@ def linearise(
 
 
 def skew(vectors: FloatArray) -> FloatArray:
-    """Return the matrices (n, 3, 3) whose products are cross products with vectors (n, 3)."""
-    matrices = np.zeros((len(vectors), 3, 3))
-    matrices[:, [2, 0, 1], [1, 2, 0]] = vectors
-    matrices[:, [1, 2, 0], [2, 0, 1]] = -vectors
+    """Return the matrices (..., 3, 3) whose products are cross products with vectors (..., 3)."""
+    matrices = np.zeros((*vectors.shape, 3))
+    matrices[..., [2, 0, 1], [1, 2, 0]] = vectors
+    matrices[..., [1, 2, 0], [2, 0, 1]] = -vectors
     return matrices
 
 

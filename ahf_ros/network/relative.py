@@ -152,7 +152,7 @@ def _improved(
 
     def error(step: FloatArray) -> FloatArray:
         turn, base = moved(step)
-        return sampson_errors(skew(-base[None])[0] @ turn, first, second)
+        return sampson_errors(skew(-base) @ turn, first, second)
 
     residuals = error(np.zeros(5))
     scale = _least_median_scale(residuals, 5, sigma)

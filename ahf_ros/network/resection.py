@@ -99,9 +99,8 @@ def _samples(number: int) -> NDArray[np.intp]:
 
 def _sampled(points: FloatArray, xy: FloatArray) -> list[Pose]:
     """Return the poses of P3P of samples of three points."""
-    moved = []  # rotation vectors and shifts
+    moved, flags = [], cv2.SOLVEPNP_P3P  # rotation vectors and shifts
     for three in _samples(len(points)):
-        flags = cv2.SOLVEPNP_P3P
         count, *found = cv2.solveP3P(points[three], xy[three], np.eye(3), None, flags)
         moved += [np.ravel(of) for of in zip(*found, strict=True)][:count]
     if not moved:

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ahf_ros.network.camera import rotation_matrices
+from ahf_ros.network.camera import rotation_matrices, skew
 from ahf_ros.network.network import FloatArray
 
 
@@ -110,8 +110,7 @@ def lever(places: FloatArray) -> FloatArray:
     """
     result = np.zeros((*places.shape[:-1], 6, 6))
     result[...] = np.eye(6)
-    result[..., [0, 1, 2], [4, 5, 3]] = places[..., [2, 0, 1]]
-    result[..., [0, 1, 2], [5, 3, 4]] = -places[..., [1, 2, 0]]
+    result[..., :3, 3:] = skew(-places)
     return result
 
 
