@@ -245,6 +245,16 @@ void vote_peaks(count rows, count wide, count most, const uint16_t votes[rows][w
                 float needed, float enough, float flat, int64_t reach, int64_t cells[most],
                 float sums[most], float shift[2][most], bool highest[most]);
 
+/* blobs.c */
+
+/* Blobs of pixels that are set, of at least so many pixels and of a length, px, of up to 1000: the
+   first pixel, how many there are, the longer side, the highest value, the means of x and y, and the
+   central moments xx, xy and yy. Where there are fewer than `most`, the sizes of the others are 0. */
+void blobs(count h, count w, count most, const bool set[h][w], const uint8_t values[h][w],
+           int64_t fewest, int64_t longest, int64_t first[most], int64_t size[most],
+           int64_t length[most], uint8_t highest[most], double moments[5][most],
+           int64_t scratch[2][w][14]);
+
 /* cctag_rays.c */
 
 /* Gray values at n evenly spaced radii of m rays of targets, over the light, whose slope is known at

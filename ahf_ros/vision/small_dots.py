@@ -13,6 +13,7 @@ from functools import partial
 import cv2
 import numpy as np
 
+from ahf_ros import kernels
 from ahf_ros.vision.common_search import BLOBS, dots_in_common
 from ahf_ros.vision.dots import NO_DOTS, Dots, best
 from ahf_ros.vision.frame import affine_frames, translated
@@ -34,14 +35,11 @@ _LEVELS = {-1: 0.62, 1: 0.4}  # of the step of ln, about halfway in gray values
 _REDUCTION = 4  # of the image in which the ground is looked for
 _REACH = 4  # px about a pixel, in which the highest step is looked for
 _NEAR = np.ones((2 * _REACH + 1, 2 * _REACH + 1), np.uint8)
-_BESIDE = np.ones((1, 3), np.uint8)
 _BLUR = 0.15  # px^2, variance that blur adds to a dot that is cut off at half of its height
 _MINIMUM_MINOR = 0.6  # px
 _MINIMUM_PIXELS = 4
 _FILLED = (0.7, 1.35)  # pixels of a dot over the area of its ellipse
 _STRIP = 2**22  # pixels looked at at a time, so that memory is used again, not made anew
-_TILE = 32  # side of a tile, px; empty tiles are left out
-_MAXIMUM_TILES = 0.3  # of the image; where there are more, it is looked at as a whole
 
 
 def small_dots_in(
@@ -113,103 +111,26 @@ def _blobs_of_strips(
 def _blobs(height: np.ndarray, min_radius: float, max_radius: float, polarity: int) -> Dots:
     """Return the blobs of an image of steps that have the shape of a dot."""
     least = _MINIMUM_STEP / _LN_RANGE * 255
-    most = 2 * max_radius + 3
-    x, y, size = _connected(height, least, _LEVELS[polarity], most)
-    if not len(size):
-        return NO_DOTS
-    start = np.cumsum(size) - size
-    peak = np.maximum.reduceat(height[y, x], start)
-    x, y = x.astype(np.float64), y.astype(np.float64)
-    width = np.maximum.reduceat(x, start) - np.minimum.reduceat(x, start)
-    longest = 1 + np.maximum(width, y[start + size - 1] - y[start])  # rows ascend in a blob
-
-    def mean(values: np.ndarray) -> np.ndarray:
-        return np.add.reduceat(values, start) / size
-
-    centre_x, centre_y = mean(x), mean(y)
-    x, y = x - np.repeat(centre_x, size), y - np.repeat(centre_y, size)
-    xx, xy, yy = mean(x * x), mean(x * y), mean(y * y)
+    longest = 2 * max_radius + 3
+    level = cv2.dilate(height, _NEAR)
+    # In place, as new memory takes longer.
+    cv2.max(level, int(least), level)  # type: ignore[call-overload]
+    shown = height > cv2.convertScaleAbs(level, level, alpha=_LEVELS[polarity])
+    most = np.count_nonzero(shown) // _MINIMUM_PIXELS
+    first, size, length, peak, moments, _ = kernels.blobs(
+        shown, height, _MINIMUM_PIXELS, int(longest), most=most
+    )
+    order = np.argsort(first[: np.count_nonzero(size)])
+    size, length, peak, moments = size[order], length[order], peak[order], moments[:, order]
+    centre_x, centre_y, xx, xy, yy = moments
     middle, half = (xx + yy) / 2, np.hypot((xx - yy) / 2, xy)
     ellipse = np.pi * 4 * np.sqrt(np.maximum(xx * yy - xy * xy, 0))
     filled = size / np.maximum(ellipse, 1e-9)
     major = 2 * np.sqrt(np.maximum(middle + half - _BLUR, 0))
     minor = 2 * np.sqrt(np.maximum(middle - half - _BLUR, (_MINIMUM_MINOR / 2) ** 2))
-    good = (longest >= 2 * min_radius - 2) & (longest <= most) & (peak >= least)
+    good = (length >= 2 * min_radius - 2) & (peak >= least)
     good &= (major >= min_radius) & (major <= max_radius)
     good &= (filled < _FILLED[1]) & (filled > _FILLED[0])
     which = best(np.flatnonzero(good), -peak[good].astype(float), MAXIMUM_BLOBS, 'small dots')
     frames = affine_frames(centre_x, centre_y, major, minor, np.arctan2(xy, (xx - yy) / 2) / 2)
     return Dots(frames[which], np.full(len(which), polarity), np.ones(len(which)))
-
-
-def _connected(
-    height: np.ndarray, least: float, share: float, longest: float
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return columns and rows of the pixels of blobs, one by one, and how many each has.
-
-    None has more pixels than a blob of a length, px; those of more length may be among them.
-    """
-    column = np.ones((int(longest) + 1 | 1, 1), np.uint8)  # odd, as OpenCV shifts others
-    none = np.zeros(0, np.int32)
-    found: list[tuple[np.ndarray, ...]] = [(none, none, none)]
-    for top, left, part, own in _parts(height, least):
-        level = cv2.dilate(part, _NEAR)
-        # In place, as new memory takes longer.
-        cv2.max(level, int(least), level)  # type: ignore[call-overload]
-        mask = part > cv2.convertScaleAbs(level, level, alpha=share)
-        if own is not None:
-            mask &= own
-        if not mask.any():
-            continue
-        # A column of more pixels is part of a blob that is longer, as is what touches it.
-        rest = mask.view(np.uint8)
-        columns = cv2.morphologyEx(
-            rest, cv2.MORPH_OPEN, column, borderType=cv2.BORDER_CONSTANT, borderValue=0
-        )
-        cv2.subtract(rest, columns, rest)
-        touching = np.flatnonzero(mask & cv2.dilate(columns, _BESIDE).view(bool))
-        # The default algorithm of OpenCV 4.5 crashes on large images with this connectivity.
-        count, labels = cv2.connectedComponentsWithAlgorithm(rest, 4, cv2.CV_32S, cv2.CCL_SAUF)
-        places = np.flatnonzero(mask)
-        label: np.ndarray = labels.ravel().take(places)
-        area = np.bincount(label, minlength=count)
-        area[labels.ravel().take(touching)] = 0
-        # A blob of more pixels is longer. How long the others are is measured on what is left.
-        usable = (area >= _MINIMUM_PIXELS) & (area <= longest**2)
-        of_usable = np.flatnonzero(usable.take(label))
-        order = of_usable[np.argsort(label[of_usable], kind='stable')]
-        y, x = np.divmod(places[order], mask.shape[1])
-        found.append((x + left, y + top, area[usable]))
-    x, y, size = (np.concatenate(column) for column in zip(*found, strict=True))
-    return x, y, size
-
-
-def _parts(
-    height: np.ndarray, least: float
-) -> Iterator[tuple[int, int, np.ndarray, np.ndarray | None]]:
-    """Yield the parts of an image that hold blobs with a pixel of a value, connected ones in one.
-
-    Each comes with its first row and column, and a mask of what in it is not in another part; the
-    image as a whole where that is not much more. A margin is as wide as `_NEAR` reaches.
-    """
-    tall, wide = (-(-side // _TILE) for side in height.shape)
-    margins = (0, tall * _TILE - height.shape[0], 0, wide * _TILE - height.shape[1])
-    padded = cv2.copyMakeBorder(height, *margins, cv2.BORDER_CONSTANT)
-    highest = padded.reshape(tall, _TILE, -1).max(axis=1).reshape(tall, wide, _TILE).max(axis=2)
-    tiles = cv2.dilate((highest >= least).astype(np.uint8), np.ones((3, 3), np.uint8))
-    count, labels, stats, _ = cv2.connectedComponentsWithStats(tiles)
-    extents = stats[1:, cv2.CC_STAT_WIDTH] * stats[1:, cv2.CC_STAT_HEIGHT]
-    if extents.sum() > _MAXIMUM_TILES * tiles.size:
-        yield 0, 0, height, None
-        return
-    for number in range(1, count):
-        column, row, columns, rows, _ = stats[number].tolist()
-        own = labels[row : row + rows, column : column + columns] == number
-        own = np.kron(own, np.ones((_TILE, _TILE), bool))
-        own = np.pad(own, _REACH)
-        top, left = row * _TILE - _REACH, column * _TILE - _REACH
-        bottom, right = top + own.shape[0], left + own.shape[1]
-        own = own[max(-top, 0) :, max(-left, 0) :]
-        top, left = max(top, 0), max(left, 0)
-        part = height[top:bottom, left:right]
-        yield top, left, part, own[: part.shape[0], : part.shape[1]]
