@@ -248,7 +248,9 @@ def _densities(values: np.ndarray) -> np.ndarray:
     count = len(values)
     bins = _bins(values) + _BINS * np.arange(count)[:, None, None]
     counts = np.bincount(bins.ravel(), minlength=_BINS * count).reshape(count, _BINS)
-    return counts @ _SMOOTHING / (bins[0].size * _BIN if count else 1.0)
+    # A product of matrices would round those of a target by how many there are.
+    smoothed = np.einsum('kb,bc->kc', counts, _SMOOTHING)
+    return np.asarray(smoothed / (bins[0].size * _BIN if count else 1.0))
 
 
 @dataclass(frozen=True, slots=True)
