@@ -61,9 +61,9 @@ def checked_target(target: Any, name: str) -> Target:
         raise ValueError(f'{name} is {shown(target)}, accepted is a Target')
     values: dict[str, Any] = {}
     changed = not _only_adds_fields(type(target))
-    for item in fields(Target):
-        value = getattr(target, item.name, None)
-        values[item.name] = checked = _CHECKS[item.name](value, f'{name}: {item.name}')
+    for item, check in _OF_FIELDS:
+        value = getattr(target, item, None)
+        values[item] = checked = check(value, f'{name}: {item}')
         changed |= checked is not value
     if isinstance(target, SquareMarker) and not changed:
         _check_corners(target.corners, f'{name}: corners')
@@ -185,3 +185,4 @@ _CHECKS: dict[str, Callable[[Any, str], Any]] = {
     'polarity': partial(checked_integer, minimum=-1, maximum=1),
     'followed': _flag,
 }
+_OF_FIELDS = [(it.name, _CHECKS[it.name]) for it in fields(Target)]

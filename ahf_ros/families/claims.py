@@ -14,12 +14,13 @@ import numpy as np
 from ahf_ros.base.target import UNDECODED, Target
 from ahf_ros.families.undecoded import undecoded
 
-Rivals = Callable[[int], np.ndarray]
-"""From the index of a claim to which of k claims are its rivals, ndarray of bool, shape (k,).
+Rivals = Callable[[np.ndarray], np.ndarray]
+"""From the indices of n claims to which of k claims are rivals of each, ndarray of bool, (n, k).
 
-The claim itself may be among them. The relation need not be mutual.
+A claim may be among its own. The relation need not be mutual.
 """
 
+_AT_ONCE = 2**16  # pairs of claims, which bounds the memory
 _SURER = 3.0  # times as sure of its word as a rival, from which a claim leads
 _BEYOND_DOUBT = 20.0  # times as likely right as wrong, from which none is surer of its ID
 
@@ -32,9 +33,11 @@ def owners(count: int, rivals: Rivals) -> np.ndarray:
     ndarray of bool, shape (k,).
     """
     owning = np.ones(count, bool)
-    for index in range(count):
-        if owning[index]:
-            owning[index + 1 :] &= ~rivals(index)[index + 1 :]
+    for part in _parts(np.arange(count), count):
+        left = part[owning[part]]
+        for index, of_claim in zip(left.tolist(), rivals(left), strict=True):
+            if owning[index]:
+                owning[index + 1 :] &= ~of_claim[index + 1 :]
     return owning
 
 
@@ -49,14 +52,24 @@ def leading(
 
     A lead over it is as good. Arrays have the shape (k,).
     """
-    ahead = certain.copy()
-    for index in np.flatnonzero(certain).tolist():
-        others = certain & rivals(index)
-        others[index] = False
-        if others.any():
-            enough = np.minimum(times * scores[others], scores[others] + lead)
-            ahead[index] = (scores[index] >= enough).all()
+    every = np.flatnonzero(certain)
+    ahead, enough = certain.copy(), np.minimum(times * scores[every], scores[every] + lead)
+    for part in _parts(every, len(scores)):
+        others = rivals(part)[:, every] & (part[:, None] != every)
+        ahead[part] = (~others | (scores[part, None] >= enough)).all(axis=1)
     return ahead
+
+
+def _parts(claims: np.ndarray, count: int) -> list[np.ndarray]:
+    """Return some claims in parts whose pairs with all of so many are few enough."""
+    size = max(_AT_ONCE // max(count, 1), 1)
+    return [claims[start : start + size] for start in range(0, len(claims), size)]
+
+
+def within(frames: np.ndarray, reach: np.ndarray) -> Rivals:
+    """Return which centres of frames, (k, 3, 3), lie within the reach of one, (k,)."""
+    x, y = frames[:, :2, 2].T
+    return lambda of: np.hypot(x - x[of, None], y - y[of, None]) < reach[of, None]
 
 
 def surer(sure: np.ndarray, certain: np.ndarray, rivals: Rivals) -> np.ndarray:
@@ -138,8 +151,8 @@ def _places_and_prints(targets: Sequence[Target], reach: float) -> tuple[Rivals,
     prints: dict[tuple[str, int, int], int] = {}
     of_print = np.array([prints.setdefault(it.print, len(prints)) for it in targets], int)
 
-    def near(index: int) -> np.ndarray:
-        some: np.ndarray = np.hypot(x - x[index], y - y[index]) < np.minimum(radii, radii[index])
-        return some
+    def near(of: np.ndarray) -> np.ndarray:
+        away = np.hypot(x - x[of, None], y - y[of, None])
+        return np.asarray(away < np.minimum(radii, radii[of, None]))
 
-    return near, lambda index: of_print == of_print[index]
+    return near, lambda of: of_print == of_print[of, None]

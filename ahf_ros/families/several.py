@@ -175,9 +175,9 @@ class SeveralDetector:
         x, y = np.array([(named[it][1].x, named[it][1].y) for it in order]).reshape(-1, 2).T
         reach, of = np.array(radii)[order], np.array([named[it][0] for it in order], int)
 
-        def rivals(index: int) -> np.ndarray:
-            near = np.hypot(x - x[index], y - y[index]) < np.maximum(reach, reach[index])
-            return near & (of != of[index])
+        def rivals(some: np.ndarray) -> np.ndarray:
+            away = np.hypot(x - x[some, None], y - y[some, None])
+            return (away < np.maximum(reach, reach[some, None])) & (of != of[some, None])
 
         owning = owners(len(order), rivals)
         return sorted_targets(

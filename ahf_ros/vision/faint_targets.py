@@ -44,6 +44,8 @@ def _same_place(one: Target, other: Target) -> bool:
 
 def displaced(target: Target, x: float, y: float) -> Target:
     """Return a target that lies elsewhere in an image, with its dots."""
+    if not x and not y:
+        return target
     moved = replace(target, x=target.x + x, y=target.y + y)
     if not isinstance(moved, DottedTarget):
         return moved

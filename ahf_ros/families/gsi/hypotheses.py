@@ -180,9 +180,9 @@ def plausible(
     words, support, centres = readings.words[order], readings.support[order], units[:, :2, 2]
     alike, near = _within_each(centres, units), _within_each(centres, around)
 
-    def rivals(index: int) -> np.ndarray:
-        worse = support < support[index] - (0.0 if obvious else _CLEARLY)
-        return alike(index) & (words == words[index]) | near(index) & worse
+    def rivals(of: np.ndarray) -> np.ndarray:
+        worse = support < support[of, None] - (0.0 if obvious else _CLEARLY)
+        return alike(of) & (words == words[of, None]) | near(of) & worse
 
     return order[owners(len(order), rivals)][:_MAXIMUM]
 
@@ -207,8 +207,8 @@ def _within_each(points: np.ndarray, frames: np.ndarray) -> Rivals:
     """Return which points, shape (n, 2), lie in each of some circles, by affine frames."""
     centres, inverse = frames[:, :2, 2], np.linalg.inv(frames[:, :2, :2]).swapaxes(1, 2)
 
-    def within(index: int) -> np.ndarray:
-        relative = (points - centres[index]) @ inverse[index]
-        return (relative**2).sum(axis=1) < 1
+    def within(of: np.ndarray) -> np.ndarray:
+        relative = (points - centres[of, None]) @ inverse[of]
+        return np.asarray((relative**2).sum(axis=2) < 1)
 
     return within

@@ -18,7 +18,7 @@ from functools import lru_cache
 import numpy as np
 
 from ahf_ros.base.blas import one_blas_thread
-from ahf_ros.families.claims import owners
+from ahf_ros.families.claims import owners, within
 from ahf_ros.families.contract import DetectorSettings
 from ahf_ros.families.ring.polar import angles_of
 from ahf_ros.prints import RING_NAMES
@@ -275,11 +275,10 @@ def _distinct(bands: Bands) -> Bands:
     """Return one band of each place, the one whose edges are most exactly circles."""
     order = np.argsort(bands.spread, kind='stable')
     exact = bands.select(order)
-    centres, reach = exact.frames[:, :2, 2], exact.size * exact.outer
+    near = within(exact.frames, exact.size * exact.outer)
 
-    def beside(index: int) -> np.ndarray:
-        near = np.hypot(*(centres - centres[index]).T) < reach[index]
-        return near & (exact.image == exact.image[index])
+    def beside(of: np.ndarray) -> np.ndarray:
+        return near(of) & (exact.image == exact.image[of, None])
 
     return bands.select(np.sort(order[owners(len(order), beside)]))
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ahf_ros.families.claims import Rivals, leading, owners, sole_owners, surer
+from ahf_ros.families.claims import Rivals, leading, owners, sole_owners, surer, within
 from ahf_ros.families.ring.confidence import COVERED
 from ahf_ros.families.ring.decoding import CLEAR
 from ahf_ros.families.ring.hypotheses import Hypotheses
@@ -91,8 +91,8 @@ def resolve(hypotheses: Hypotheses, ids: np.ndarray) -> tuple[np.ndarray, np.nda
     order = np.arange(len(ids))
     on_it = on_targets(hypotheses, hypotheses.certain)
 
-    def against(index: int) -> np.ndarray:
-        return on_it(index) & (ids != ids[index]) & (order > index)
+    def against(of: np.ndarray) -> np.ndarray:
+        return on_it(of) & (ids != ids[of, None]) & (order > of[:, None])
 
     kept = owners(len(ids), on_it)
     ahead = (
@@ -102,14 +102,13 @@ def resolve(hypotheses: Hypotheses, ids: np.ndarray) -> tuple[np.ndarray, np.nda
     certain = kept & np.any([*ahead], axis=0)
     sure = 1 / (1 - hypotheses.confidence + np.finfo(float).eps)
     certain = surer(sure, certain, overlapping(hypotheses))
-    return kept, sole_owners(hypotheses.confidence, certain, lambda index: ids == ids[index])
+    return kept, sole_owners(hypotheses.confidence, certain, lambda of: ids == ids[of, None])
 
 
 def on_targets(hypotheses: Hypotheses, certain: np.ndarray) -> Rivals:
     """Return what lies on the dot of a hypothesis, or on the band of a certain one."""
     reach = np.where(certain, hypotheses.reach, frame.ellipse_axes(hypotheses.frames)[0])
-    centres = hypotheses.frames[:, :2, 2]
-    return lambda index: np.hypot(*(centres - centres[index]).T) < reach[index]
+    return within(hypotheses.frames, reach)
 
 
 def overlapping(hypotheses: Hypotheses) -> Rivals:
@@ -122,9 +121,9 @@ def overlapping(hypotheses: Hypotheses) -> Rivals:
     outer = major * np.array([code.band_outer for code in hypotheses.families])
     centres = np.column_stack([hypotheses.frames[:, :2, 2], np.ones(len(major))])
 
-    def overlapping(index: int) -> np.ndarray:
-        x, y, scale = np.linalg.solve(hypotheses.frames[index], centres.T)
-        distance = np.hypot(x, y) / np.abs(scale) * major[index]
-        return np.asarray(distance < _OVERLAP * (outer + outer[index]))
+    def overlapping(of: np.ndarray) -> np.ndarray:
+        x, y, scale = np.linalg.solve(hypotheses.frames[of], centres.T[None]).swapaxes(0, 1)
+        distance = np.hypot(x, y) / np.abs(scale) * major[of, None]
+        return np.asarray(distance < _OVERLAP * (outer + outer[of, None]))
 
     return overlapping

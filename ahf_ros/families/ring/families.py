@@ -14,7 +14,7 @@ from itertools import chain
 
 import numpy as np
 
-from ahf_ros.families.claims import leading
+from ahf_ros.families.claims import leading, within
 from ahf_ros.families.ring.hypotheses import Hypotheses
 from ahf_ros.families.ring.known import NOTHING_KNOWN, Prior
 from ahf_ros.families.ring.reading import read_bands
@@ -62,11 +62,11 @@ def _narrowest(words: dict[RingPrint, int]) -> dict[RingPrint, int]:
 def contested(read: Hypotheses) -> Hypotheses:
     """Return hypotheses of which none is certain where another family has more evidence."""
     _, minor, _ = frame.ellipse_axes(read.frames)
-    centres, names = read.frames[:, :2, 2], np.array([code.name for code in read.families], str)
+    names = np.array([code.name for code in read.families], str)
+    near = within(read.frames, minor)
 
-    def rivals(index: int) -> np.ndarray:
-        near = np.hypot(*(centres - centres[index]).T) < minor[index]
-        return near & (names != names[index])
+    def rivals(of: np.ndarray) -> np.ndarray:
+        return near(of) & (names != names[of, None])
 
     beaten = read.certain & ~leading(odds(read), read.certain, rivals, 1.0)
     return replace(read, confidence=np.where(beaten, 0.0, read.confidence))
