@@ -199,9 +199,8 @@ def _below_right_ones(read: Hypotheses, right: np.ndarray) -> np.ndarray:
 
     These are not reported, whatever their confidence is.
     """
-    over, margin = overlapping(read), read.margin
-    below = [(over(it) & right & (margin > margin[it])).any() for it in range(len(right))]
-    return np.array(below, bool)
+    over, margin = overlapping(read)(np.arange(len(right))), read.margin
+    return np.asarray((over & right & (margin > margin[:, None])).any(axis=1))
 
 
 def rising_regression(

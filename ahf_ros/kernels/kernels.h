@@ -255,6 +255,32 @@ void blobs(count h, count w, count most, const bool set[h][w], const uint8_t val
            int64_t length[most], uint8_t highest[most], double moments[5][most],
            int64_t scratch[2][w][14]);
 
+/* triples.c */
+
+/* Triples of d dots, and the maps from a plane of the print to pixels that they imply. The first two
+   are the ends of a pair, of n that come with their offsets in the unit of their first dot, whose map
+   to pixels is known; the third is where a turn takes the second, within an error, a share of the
+   length and what is added: the end of one of the pairs from `begin` on. The basis takes the print to
+   two unit vectors. In ln, axes of dots may be as far from the printed ones as is allowed for each,
+   and all are larger by a factor between two scales. */
+void likely_triples(count n, count d, count k, count most, const int64_t ends[n][2],
+                    const double offsets[n][2], const double maps[d][2][2],
+                    const double inverses[d][2][2], const double allowed[d], const double turn[2],
+                    const double basis[2][2], const double printed[3], const double error[2],
+                    const double scales[2], const int64_t partners[k], const int64_t begin[k],
+                    const int64_t end[k], int64_t triples[most][3],
+                    double affine[most][2][2], int64_t found[1]);
+
+/* homographies.c */
+
+/* Homographies from points to their images, whose weights are inverse covariances, and the
+   covariances of the images of the origin. Before, an object that reaches so far has no perspective,
+   which has a weight; the other unknowns have a weak one. */
+void fitted_homographies(rows k, count m, const double points[k][m][2],
+                         const double images[k][m][2], const double weights[k][m][2][2],
+                         double reach, double weak, double perspective, double least_depth,
+                         int16_t rounds, double homographies[k][3][3], double covariance[k][2][2]);
+
 /* cctag_rays.c */
 
 /* Gray values at n evenly spaced radii of m rays of targets, over the light, whose slope is known at

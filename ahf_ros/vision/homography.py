@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ahf_ros import kernels
 from ahf_ros.vision.frame import determinants, project
 
 _ROUNDS = 3  # of linear solutions: each divides by the depth of the one before
@@ -31,40 +32,11 @@ def fit_homographies(
     its size from there, in their unit. Their images, shape (k, m, 2), are px. Weights are inverse
     variances, shape (k, m), or covariances, (k, m, 2, 2), 1/px^2; zero leaves a point out.
     """
-    count = len(images)
-    scaled = np.broadcast_to(points / reach, images.shape)
+    points = np.broadcast_to(points, images.shape)
     if weights.ndim == 2:
         weights = weights[..., None, None] * np.eye(2)
-    total = np.maximum(np.trace(weights, axis1=2, axis2=3).sum(axis=1), 1e-30)
-    share = np.trace(weights, axis1=2, axis2=3) / total[:, None]
-    middle = (share[..., None] * images).sum(axis=1)
-    size = np.sqrt((share[..., None] * (images - middle[:, None]) ** 2).sum(axis=(1, 2)))
-    size = np.maximum(size, 1e-6)[:, None]
-    target = (images - middle[:, None]) / size[..., None]
-    weights = weights * size[..., None, None] ** 2
-    prior = np.diag([_WEAK] * 6 + [_PERSPECTIVE**-2] * 2)
-    homogeneous = np.concatenate([scaled, np.ones((*scaled.shape[:2], 1))], axis=2)
-    depth = np.ones(images.shape[:2])
-    for _ in range(_ROUNDS):
-        design = np.zeros((count, scaled.shape[1], 2, 8))
-        design[:, :, 0, :3] = design[:, :, 1, 3:6] = homogeneous
-        design[..., 6:] = -target[..., None] * scaled[..., None, :]
-        design /= depth[..., None, None]
-        weighted = (weights @ design).reshape(count, 2 * scaled.shape[1], 8)
-        normal = weighted.transpose(0, 2, 1) @ design.reshape(weighted.shape) + prior
-        right = (weighted * (target / depth[..., None]).reshape(*weighted.shape[:2], 1)).sum(
-            axis=1
-        )
-        solution = np.linalg.solve(normal, right[..., None])[..., 0]
-        depth = 1 + (scaled * solution[:, None, 6:]).sum(axis=2)
-        depth = np.maximum(depth, _MINIMUM_DEPTH)
-    elements = np.concatenate([solution, np.ones((count, 1))], axis=1).reshape(-1, 3, 3)
-    elements[:, :, :2] /= reach
-    back = np.zeros((count, 3, 3))
-    back[:, 0, 0] = back[:, 1, 1] = size[:, 0]
-    back[:, :2, 2], back[:, 2, 2] = middle, 1.0
-    of_centre = np.linalg.inv(normal)[:, [[2], [5]], [2, 5]]
-    return HomographyFit(back @ elements, of_centre * size[..., None] ** 2)
+    given = points, images, weights, reach, _WEAK, _PERSPECTIVE**-2, _MINIMUM_DEPTH, _ROUNDS
+    return HomographyFit(*kernels.fitted_homographies(*given))
 
 
 def local_frames(homographies: np.ndarray, points: np.ndarray, radii: np.ndarray) -> np.ndarray:

@@ -17,6 +17,7 @@ from itertools import pairwise
 import cv2
 import numpy as np
 
+from ahf_ros import kernels
 from ahf_ros.prints.gsi import PointPrint
 from ahf_ros.vision import frame
 from ahf_ros.vision.array_record import ArrayRecord
@@ -288,21 +289,15 @@ def _members(
     total = np.cumsum(end - begin)
     parts = np.searchsorted(total, np.arange(0, total[-1:].sum() + _PART, _PART))
     found = [np.zeros((0, len(places)), int)]
+    find = _likely_triples(dots, pairs, family, triple)
     for low, high in pairwise(parts):
-        of_part = slice(low, high)
-        first, other = _thirds(
-            pairs, partners[of_part], begin[of_part], end[of_part], arms[partner], arms[third]
-        )
-        affine = _affine(pairs.offset[first], pairs.offset[other], arms[partner], arms[third])
-        members = np.full((len(first), len(places)), -1)
-        members[:, role] = pairs.first[first]
-        members[:, partner], members[:, third] = pairs.second[first], pairs.second[other]
-        base = dots.frames[members[:, role], :2, :2] @ [[1, 0], [0, -1]]
-        affine = base @ affine  # px a printed dot radius
-        good = _bears_out(dots, members, affine, family, (role, partner, third))
-        if not good.any():
+        of_part = partners[low:high], begin[low:high], end[low:high]
+        most = int((end - begin)[low:high].sum())
+        triples, affine, (count,) = find(*of_part, most=most)
+        if not count:
             continue
-        members, affine = members[good], affine[good]
+        members, affine = np.full((count, len(places)), -1), affine[:count]
+        members[:, [*triple]] = triples[:count]
         origin, inverse = dots.frames[members[:, role], :2, 2], frame.inverses(affine)
         error = np.zeros(len(members))
         for index in np.setdiff1d(np.arange(len(places)), (role, partner, third)):
@@ -316,64 +311,27 @@ def _members(
     return np.concatenate(found)
 
 
-def _thirds(
-    pairs: Pairs,
-    partners: np.ndarray,
-    begin: np.ndarray,
-    end: np.ndarray,
-    partner: np.ndarray,
-    third: np.ndarray,
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return pairs, and for each a pair with the same first dot whose second is about a third dot.
+def _likely_triples(
+    dots: Dots, pairs: Pairs, family: PointPrint, triple: tuple[int, int, int]
+) -> Callable[..., tuple[np.ndarray, np.ndarray, np.ndarray]]:
+    """Return the kernel that finds triples of dots, with what it must know of dots and print.
 
-    It is where the template has it, turned and scaled so that the partner is where the first pair
-    says. Pairs from `begin` to `end` are about as long as that.
+    A third dot is where the template has it, turned and scaled so that the partner is where a pair
+    says. The ellipses of all three are those that their affine map implies; they may all be larger
+    than printed or smaller, by one factor.
     """
-    expected = pairs.offset[partners] / complex(*partner) * complex(*third)
-    count = end - begin
-    place = np.repeat(np.arange(len(begin)), count)
-    inside = np.arange(len(place)) - np.repeat(np.cumsum(count) - count, count)
-    other = begin[place] + inside
-    gap = np.abs(pairs.offset[other] - expected[place])
-    near = gap < pairs.error_at(np.abs(expected))[place]
-    return partners[place[near]], other[near]
-
-
-def _affine(
-    first: np.ndarray, second: np.ndarray, arm: np.ndarray, other: np.ndarray
-) -> np.ndarray:
-    """Return the linear maps, shape (k, 2, 2), that take two arms to their images."""
-    images = np.array([[first.real, second.real], [first.imag, second.imag]]).transpose(2, 0, 1)
-    return images @ np.linalg.inv(np.stack([arm, other], axis=1))
-
-
-def _bears_out(
-    dots: Dots,
-    members: np.ndarray,
-    affine: np.ndarray,
-    family: PointPrint,
-    roles: tuple[int, int, int],
-) -> np.ndarray:
-    """Return where the ellipses of three dots are those that their affine map implies.
-
-    They may all be larger than printed or smaller, by one factor.
-    """
-    good = affine[:, 0, 0] * affine[:, 1, 1] < affine[:, 0, 1] * affine[:, 1, 0]  # y up, then down
-    _, minor, _ = frame.ellipse_axes(dots.frames)
-    which = members[:, roles]
-    allowed = _ELLIPSE_ERROR + _ELLIPSE_PIXELS / minor[which]
-    inverse = frame.inverses(dots.frames[:, :2, :2])
-    printed = family.template_radii[[*roles]] / family.template_radii[roles[0]]
-    relative = inverse[which] @ affine[:, None] * printed[:, None, None]
-    square = (relative**2).sum(axis=(2, 3)) / 2
-    determinant = np.abs(_cross(relative[:, :, 0], relative[:, :, 1]))
-    half = np.sqrt(np.maximum(square**2 - determinant**2, 0))
-    large = np.log(np.maximum(square + half, 1e-9)) / 2
-    small = np.log(np.maximum(square - half, 1e-9)) / 2
-    scale = -np.median((large + small) / 2, axis=1)
-    good &= ((large + scale[:, None] < allowed) & (small + scale[:, None] > -allowed)).all(axis=1)
-    smallest, largest = np.log(radius_scales(family))
-    return good & (scale > smallest - allowed[:, 0]) & (scale < largest + allowed[:, 0])
+    ellipses, minor = dots.frames[:, :2, :2], frame.ellipse_axes(dots.frames)[1]
+    radii = family.template_radii[[*triple]]
+    partner, third = (family.places[[*triple[1:]]] - family.places[triple[0]]) / radii[0]
+    turn = complex(*third) / complex(*partner)
+    return partial(
+        kernels.likely_triples,
+        *(np.stack([pairs.first, pairs.second], axis=1), pairs.offset.view(float).reshape(-1, 2)),
+        *(ellipses @ np.diag([1.0, -1.0]), frame.inverses(ellipses)),
+        *(_ELLIPSE_ERROR + _ELLIPSE_PIXELS / minor, (turn.real, turn.imag)),
+        *(np.linalg.inv(np.stack([partner, third], axis=1)), radii / radii[0]),
+        *(pairs.error, np.log(radius_scales(family))),
+    )
 
 
 def _cross(first: np.ndarray, second: np.ndarray) -> np.ndarray:
