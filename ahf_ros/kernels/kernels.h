@@ -233,6 +233,16 @@ void edge_covariances(count k, count m, const double parts[k][2][m], const doubl
                       double correlation, double sharing, double no_weight,
                       double covariance[k][2][2]);
 
+/* log_edges.c */
+
+/* Which edge pixels do not run straight on to both sides for a length, px: the gradient there, in
+   scaled units of the image, is not a share of their strength along theirs, or is turned, by a share
+   of its square. */
+void bent_edges(count h, count w, rows k, const int16_t log[h][w], const int32_t x[k],
+                const int32_t y[k], const float unit_x[k], const float unit_y[k],
+                const float strength[k], float scale, float length, float continued,
+                float straight, bool bent[k]);
+
 /* votes.c */
 
 void count_votes(count n, count p, count s, count d, count tall, count wide, const double x[n],

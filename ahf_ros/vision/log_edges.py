@@ -9,12 +9,14 @@ from typing import Any
 import cv2
 import numpy as np
 
+from ahf_ros import kernels
+
 LOG_SCALE = 1000.0
 """Units of a logarithmic image of int16 in one unit of ln."""
 
 _WEAK_EDGE, _STRONG_EDGE = 0.15, 0.22  # steps of ln, of the thresholds with hysteresis
 _STRAIGHT = 0.97  # cosine between the directions of an edge and of its continuation
-_PART = 32_768  # edges looked at at a time, which stay in the cache
+_SCALE = 1 / 32  # of Scharr's operator, for steps of a px
 _BAND = 2**23  # pixels whose edges are listed at a time, which bounds the memory
 _CONTINUED = 0.5  # of the strength of an edge, that its continuation has at least
 
@@ -52,37 +54,11 @@ class LogEdges:
 
     def curved(self, length: float) -> LogEdges:
         """Return the edges that do not run straight on for `length` px, to neither side."""
-        reach = int(length) + 2
-        straight = [np.zeros(0, bool)]
-        for start in range(0, len(self.x), _PART):
-            part = slice(start, start + _PART)
-            rows = self.y[part]
-            first = max(rows.min() - reach, 0)
-            gradient = _gradient(self.log, self.contrast, first, rows.max() + reach + 1)
-            ahead, behind = (
-                self._continues(part, way, gradient, first) for way in (length, -length)
-            )
-            straight.append(ahead & behind)
-        return self.select(np.flatnonzero(~np.concatenate(straight)))
-
-    def _continues(
-        self, part: slice, way: float, gradient: Sequence[np.ndarray], first: int
-    ) -> np.ndarray:
-        """Return whether some edges have the same gradient `way` px along themselves.
-
-        The gradient is the one of rows from the first one on that is looked at.
-        """
-        height, width = self.log.shape
-        unit_x, unit_y = self.unit_x[part], self.unit_y[part]
-        x = np.rint(self.x[part] - np.float32(way) * unit_y)
-        y = np.rint(self.y[part] + np.float32(way) * unit_x)
-        at = (np.clip(y, 0, height - 1).astype(np.intp) - first) * width
-        at += np.clip(x, 0, width - 1).astype(np.intp)
-        across, down = (of.ravel().take(at).astype(np.float32) for of in gradient)
-        along = across * unit_x + down * unit_y
-        strong = along > np.float32(_CONTINUED) * self.strength[part]
-        squares = across * across + down * down
-        return strong & (along * along > np.float32(_STRAIGHT**2) * squares)
+        bent = kernels.bent_edges(
+            *(self.log, self.x, self.y, self.unit_x, self.unit_y, self.strength),
+            *(self.contrast * _SCALE, length, _CONTINUED, _STRAIGHT**2),
+        )
+        return self.select(np.flatnonzero(bent))
 
 
 _LISTED = 'x', 'y', 'unit_x', 'unit_y', 'strength'
@@ -137,6 +113,6 @@ def _gradient(
     above = max(first - 1, 0)
     around = log[above : beyond + 1]
     own = slice(first - above, beyond - above)
-    scale = contrast / 32
+    scale = contrast * _SCALE
     dx = cv2.Scharr(around, cv2.CV_16S, 1, 0, scale=scale)[own]
     return dx, cv2.Scharr(around, cv2.CV_16S, 0, 1, scale=scale)[own]

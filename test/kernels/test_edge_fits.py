@@ -324,5 +324,7 @@ def test_neighbours_have_errors_in_common(seed: int) -> None:
         shared = max(squares / (weights[i] ** 2).sum(), 1)
         free = count / max(count - 5, 1) * max(growth[i] / shared, 1)
         assert covariance[i] == pytest.approx(free * (parts[i] * alike) @ parts[i].T)
+    none = kernels.edge_covariances(parts, 0 * weights, spacing, 5.0, growth, 1.9, 10.0, 1e-9)
+    assert (none == 0).all()
     wild = strange(generator, k, 2, m), strange(generator, k, m), strange(generator, k, m)
     kernels.edge_covariances(*wild, 5.0, growth, 1.9, 10.0, 1e-9)

@@ -96,7 +96,6 @@ def test_edges_of_large_images_are_listed_in_bands(monkeypatch: pytest.MonkeyPat
     log = log_image(IMAGE)
     whole = find_edges(log).curved(6.0)
     monkeypatch.setattr(log_edges, '_BAND', 70 * log.shape[1])
-    monkeypatch.setattr(log_edges, '_PART', 999)
     bands = [*edges_in_bands(log)]
     parts = LogEdges.joined(bands).curved(6.0)
     assert len(bands) == 5
