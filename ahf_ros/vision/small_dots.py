@@ -112,6 +112,8 @@ def _blobs(height: np.ndarray, min_radius: float, max_radius: float, polarity: i
     """Return the blobs of an image of steps that have the shape of a dot."""
     least = _MINIMUM_STEP / _LN_RANGE * 255
     longest = 2 * max_radius + 3
+    if height.max() < least:  # in even light, where all else is explained
+        return NO_DOTS
     level = cv2.dilate(height, _NEAR)
     # In place, as new memory takes longer.
     cv2.max(level, int(least), level)  # type: ignore[call-overload]
