@@ -63,6 +63,7 @@ setup(
         'ahf_ros.network.report': ['html/*'],
         'ahf_ros.views.report': ['page/*'],
     },
+    include_package_data=False,  # which would warn that folders of data look like packages
     ext_modules=[Extension('ahf_ros.kernels.kernels', [])],
     cmdclass={'build_ext': BuildKernels, 'bdist_wheel': KernelWheel},
     # With this an editable installation is one path to the sources, new modules included.
