@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -11,19 +11,16 @@ from ahf_ros.vision.dots import Dots
 from ahf_ros.vision.frame import circle_outlines, ellipse_axes
 from ahf_ros.vision.log_edges import mask_of
 
-VOTES, BLOBS = 'votes', 'blobs'
-"""Ways of searching."""
-
 _BEYOND = 1.1  # times a bound of the radius, by how much dots may be beyond it
 _EXPLAINED = 0.5  # share of the outline of a dot within explained ones
 
 
 @dataclass(slots=True)
 class CommonSearch:
-    """Dots that were found in an image, by the way of searching.
+    """Dots that were found in an image.
 
-    The first detector that searches in some way does so for all: between the bounds of all, but
-    outside of what it has explained itself.
+    The first detector that searches does so for all: between the bounds of all, but outside of
+    what it has explained itself.
 
     Attributes
     ----------
@@ -35,40 +32,35 @@ class CommonSearch:
 
     min_radius: float
     polarities: Sequence[int]
-    found: dict[str, Dots] = field(default_factory=dict)
+    found: Dots | None = None
 
     def select(self, which: Callable[[np.ndarray], np.ndarray]) -> CommonSearch:
         """Return the search with some of its dots, by a mask (k,) of their frames (k, 3, 3)."""
-        found = {way: dots.select(which(dots.frames)) for way, dots in self.found.items()}
-        return replace(self, found=found)
+        found = self.found
+        return replace(self, found=found.select(which(found.frames)) if found else None)
 
 
 def dots_in_common(
     common: CommonSearch | None,
-    way: str,
     search: Callable[..., Dots],
     min_radius: float,
     max_radius: float,
     polarities: Sequence[int],
     explained: Sequence[np.ndarray] | np.ndarray = (),
-    *,
-    smaller: float = 1.0,
 ) -> Dots:
     """Return the dots that a search finds for one detector, which may share it with others.
 
-    Explained outlines, px, have the shape (m, 2) each. Where blur makes dots look smaller, they
-    are looked for from so many times the smallest radius on. Shared dots may be a little beyond
-    the bounds of the radius.
+    Explained outlines, px, have the shape (m, 2) each. Shared dots may be a little beyond the
+    bounds of the radius.
     """
     if common is None:
-        return search(smaller * min_radius, max_radius, polarities, explained=explained)
-    if way not in common.found:
-        low = smaller * min(min_radius, common.min_radius)
-        found = search(low, max_radius, common.polarities, explained=explained)
-        common.found[way] = found
-    found = common.found[way]
+        return search(min_radius, max_radius, polarities, explained=explained)
+    if common.found is None:
+        low = min(min_radius, common.min_radius)
+        common.found = search(low, max_radius, common.polarities, explained=explained)
+    found = common.found
     major = ellipse_axes(found.frames)[0]
-    of_size = (major * _BEYOND >= smaller * min_radius) & (major <= max_radius * _BEYOND)
+    of_size = (major * _BEYOND >= min_radius) & (major <= max_radius * _BEYOND)
     found = found.select(of_size & np.isin(found.polarity, polarities))
     return found.select(~_within(found, explained))
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from ahf_ros.vision import frame
 from ahf_ros.vision.candidates import find_candidates
-from ahf_ros.vision.common_search import VOTES, dots_in_common
+from ahf_ros.vision.common_search import dots_in_common
 from ahf_ros.vision.dots import NO_DOTS, Dots, best, distinct
 from ahf_ros.vision.ellipses import fit_ellipses, resized
 from ahf_ros.vision.log_edges import LogEdges
@@ -79,7 +79,7 @@ def voted_dots(
         return distinct(fit_ellipses(pyramid.logs, candidates))
 
     kind = min_radius, max_radius, polarities
-    return dots_in_common(pyramid.common, VOTES, search, *kind, explained)
+    return dots_in_common(pyramid.common, search, *kind, explained)
 
 
 def whole_outlines(edges: LogEdges, min_radius: float, max_radius: float) -> Dots:

@@ -8,13 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from functools import partial
 
 import cv2
 import numpy as np
 
 from ahf_ros import kernels
-from ahf_ros.vision.common_search import BLOBS, dots_in_common
 from ahf_ros.vision.dots import NO_DOTS, Dots, best
 from ahf_ros.vision.frame import affine_frames, translated
 from ahf_ros.vision.log_edges import LOG_SCALE
@@ -49,12 +47,11 @@ def small_dots_in(
     polarities: Sequence[int],
     explained: Sequence[np.ndarray] | np.ndarray = (),
 ) -> Dots:
-    """Return the `small_dots` of an image, which detectors may share."""
+    """Return the `small_dots` of an image, also those that blur makes smaller."""
     if min_radius >= LARGEST:
         return NO_DOTS
-    search = partial(small_dots, pyramid.logs[0], log_scale=LOG_SCALE)
-    kind = min_radius, min(max_radius, LARGEST), polarities, explained
-    return dots_in_common(pyramid.common, BLOBS, search, *kind, smaller=BLURRED)
+    bounds = BLURRED * min_radius, min(max_radius, LARGEST)
+    return small_dots(pyramid.logs[0], *bounds, polarities, LOG_SCALE, explained)
 
 
 def small_dots(

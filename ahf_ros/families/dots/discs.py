@@ -16,7 +16,6 @@ import numpy as np
 
 from ahf_ros.families.contract import DetectorSettings
 from ahf_ros.prints.dots import DotRingPrint
-from ahf_ros.vision.common_search import BLOBS
 from ahf_ros.vision.dot_search import voted_dots, whole_dots
 from ahf_ros.vision.dots import NO_DOTS, Dots, distinct
 from ahf_ros.vision.frame import circle_outlines, ellipse_axes, enlarged, scaled
@@ -24,7 +23,7 @@ from ahf_ros.vision.log_edges import LOG_SCALE, LogEdges, mask_of
 from ahf_ros.vision.pyramid import ImagePyramid
 from ahf_ros.vision.robust import medians
 from ahf_ros.vision.sampling import sample_circles
-from ahf_ros.vision.small_dots import BLURRED, LARGEST, small_dots, small_dots_in
+from ahf_ros.vision.small_dots import BLURRED, LARGEST, small_dots
 
 _STRAIGHT = 8.0  # length of an edge that is no small dot's, px of the image at half its size
 _TILE = 64  # side, px of the image at half its size
@@ -126,19 +125,11 @@ def _blobs(
         if smallest > largest:
             continue
         rows, columns = (slice(2 * it.start // scale, 2 * it.stop // scale) for it in region)
-        common = None if level else pyramid.common
-        if common and BLOBS in common.found:  # in the whole image
-            blobs = small_dots_in(pyramid, low, high, settings.polarities)
-            x, y = blobs.frames[:, :2, 2].T
-            within = (x >= columns.start) & (x < columns.stop)
-            within &= (y >= rows.start) & (y < rows.stop)
-            found.append(blobs.select(within))
-        else:
-            log = np.ascontiguousarray(pyramid.logs[level][rows, columns])
-            blobs = small_dots(log, smallest, largest, settings.polarities, LOG_SCALE)
-            frames = blobs.frames.copy()
-            frames[:, :2, 2] += (columns.start, rows.start)
-            found.append(replace(blobs, frames=enlarged(frames, level)))
+        log = np.ascontiguousarray(pyramid.logs[level][rows, columns])
+        blobs = small_dots(log, smallest, largest, settings.polarities, LOG_SCALE)
+        frames = blobs.frames.copy()
+        frames[:, :2, 2] += (columns.start, rows.start)
+        found.append(replace(blobs, frames=enlarged(frames, level)))
     return found
 
 

@@ -12,11 +12,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from ahf_ros.families.ring.decoding import DOUBT
-from ahf_ros.families.ring.families import contested, present_families, words_shown
+from ahf_ros.families.ring.families import present_families, words_shown
 from ahf_ros.families.ring.hypotheses import Hypotheses
 from ahf_ros.families.ring.proposals import HOPEFUL, Print, bounds, measure_likely
 from ahf_ros.families.ring.reading import read_bands
-from ahf_ros.families.ring.rivals import has_all
+from ahf_ros.families.ring.rivals import has_all, odds
 from ahf_ros.prints.ring import RingPrint
 from ahf_ros.vision.circle_fit import ENOUGH, Fit
 
@@ -29,6 +29,8 @@ _SAMPLE = 8  # of those that seem to have a print, which are read first
 _LIKELIEST = 16  # dots to have a print, of which none shows that it is not there
 _CONCEIVABLE = 0.1  # confidence of a word of many, from which it may be certain as one of few
 _NEARLY = 0.05  # mean evidence of a reading, by which a print is as good as the best one
+_ALIKE = 0.1  # the same, of prints of one band that are read beside the best one
+_MARKS = 30.0  # log odds of a word against bare paper, of dots with marks
 _PRINTS = 4  # the most likely ones, which are tried on the same dots
 
 
@@ -74,19 +76,46 @@ def _words_shown(
         return []
     dots, mean = dots.select(hopeful), mean[:, hopeful]
     likely = mean > mean.max(axis=0) - _NEARLY
-    for rank, best in enumerate(_likeliest(prints, np.maximum(mean, 0))[:tried]):
-        band, bits = prints[best]
-        same = [code for code in families if code.band == band and bits % code.bits == 0]
+    known: list[Print] = []
+    ranks = 0
+    for best in _likeliest(prints, np.maximum(mean, 0)):
+        if prints[best] in known or ranks == tried:
+            continue
         read: list[Hypotheses] = []
         order = np.argsort(-mean[best], kind='stable')
         likeliest = order[likely[best, order]][:most]
-        ends = [0, _SAMPLE, most] if rank == 0 else [0, most]
+        if not len(likeliest):
+            continue
+        alike = _alike(prints, mean[:, likeliest[:_SAMPLE]], best)
+        known += alike
+        same = [code for code in families if _has_any(code, prints[best : best + 1])]
+        rivals = [code for code in families if _has_any(code, alike) and code not in same]
+        ends = [0, most] if ranks else [0, _SAMPLE, most]
+        ranks += 1
         for some in filter(len, (likeliest[part] for part in map(slice, ends, ends[1:]))):
-            read.append(_read(gray, dots.select(some), same))
+            read.append(_read(gray, dots.select(some), same, rivals, thorough=tried > 1))
             every = Hypotheses.joined(read)
             if np.prod(1 - every.confidence) < _DOUBTED:
                 return words_shown(every, families)
     return []
+
+
+def _alike(prints: Sequence[Print], mean: np.ndarray, best: int) -> list[Print]:
+    """Return prints whose bounds on some dots, (prints, k), are about those of the best one.
+
+    Bounds tell the band. How many sectors it has, only words tell.
+    """
+    of_all = mean.mean(axis=1)
+    return [
+        it
+        for it, own in zip(prints, of_all, strict=True)
+        if it[0] == prints[best][0] and own > of_all[best] - _ALIKE
+    ]
+
+
+def _has_any(code: RingPrint, prints: Sequence[Print]) -> bool:
+    """Return whether a family has one of some prints, or every other edge of one."""
+    return any(code.band == band and bits % code.bits == 0 for band, bits in prints)
 
 
 def _likeliest(prints: Sequence[Print], mean: np.ndarray) -> list[int]:
@@ -110,29 +139,60 @@ def _likeliest(prints: Sequence[Print], mean: np.ndarray) -> list[int]:
     return list(dict.fromkeys([of_all[0], *of_best]))
 
 
-def _read(gray: np.ndarray, dots: Fit, families: Sequence[RingPrint]) -> Hypotheses:
+def _read(
+    gray: np.ndarray,
+    dots: Fit,
+    families: Sequence[RingPrint],
+    rivals: Sequence[RingPrint],
+    *,
+    thorough: bool,
+) -> Hypotheses:
     """Return the words of dots, by those of some families that explain their bands best.
 
-    Families that have all words of others are read first. Where they find nothing conceivable,
-    the others find nothing, as they have no other words.
+    Rivals, with other numbers of sectors, read those dots whose words they may explain better, or,
+    in a thorough search for words, all dots with marks. Families that have all words of others are
+    read first. Where they find nothing conceivable, the others find nothing, as they have no other
+    words.
     """
     dots, _ = measure_likely(gray, dots, None)
+    every = [*families, *rivals]
     narrow = [
         code
-        for code in families
-        if any(has_all(of, code) and len(code.words) < len(of.words) for of in families)
+        for code in every
+        if any(has_all(of, code) and len(code.words) < len(of.words) for of in every)
     ]
     found = [read_bands(gray, dots, code) for code in families if code not in narrow]
+    told = np.prod(1 - _shown(found).confidence) < _DOUBTED
+    if thorough if not told else any((of.certain & ~of.clear).any() for of in found):
+        marked = np.any([of.seen > _MARKS for of in found], axis=0)
+        dots, found = dots.select(marked), [of.select(marked) for of in found]
+        if marked.any():
+            found += [read_bands(gray, dots, code) for code in rivals if code not in narrow]
     read = _shown(found)
     if np.prod(1 - read.confidence) < _DOUBTED:
         return read  # whose prints the others may have, too
     conceivable = np.any([of.confidence >= _CONCEIVABLE for of in found], axis=0)
     if conceivable.any():
-        found += [read_bands(gray, dots.select(conceivable), code) for code in narrow]
-    return _shown(found)
+        some = [of.select(conceivable) for of in found]
+        some += [read_bands(gray, dots.select(conceivable), code) for code in narrow]
+        read = _shown(some)
+    return read
 
 
 def _shown(found: Sequence[Hypotheses]) -> Hypotheses:
-    """Return the certain ones of what families read, of each dot the best."""
-    read = contested(Hypotheses.joined(found))
-    return read.select(read.certain & (read.coded > -DOUBT))
+    """Return what is certain by as few families as have a certain word of all dots with one.
+
+    Each has read the same dots. The family that most dots have comes first, and what it explains
+    is of no other.
+    """
+    certain = np.array([of.certain & (of.coded > -DOUBT) for of in found])
+    better = np.array(
+        [np.where(own, odds(of), 0.0) for own, of in zip(certain, found, strict=True)]
+    )
+    parts = [Hypotheses.joined(found).select(slice(0))]
+    while certain.any():
+        best = np.lexsort([better.sum(axis=1), certain.sum(axis=1)])[-1]
+        parts.append(found[best].select(certain[best]))
+        left = ~certain[best]
+        certain, better = certain & left, better * left
+    return Hypotheses.joined(parts)
