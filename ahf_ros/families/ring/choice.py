@@ -95,7 +95,7 @@ def _words_shown(
         for some in filter(len, (likeliest[part] for part in map(slice, ends, ends[1:]))):
             read.append(_read(gray, dots.select(some), same, rivals, thorough=tried > 1))
             every = Hypotheses.joined(read)
-            if np.prod(1 - every.confidence) < _DOUBTED:
+            if _tells(every):
                 return words_shown(every, families)
     return []
 
@@ -162,14 +162,15 @@ def _read(
         if any(has_all(of, code) and len(code.words) < len(of.words) for of in every)
     ]
     found = [read_bands(gray, dots, code) for code in families if code not in narrow]
-    told = np.prod(1 - _shown(found).confidence) < _DOUBTED
-    if thorough if not told else any((of.certain & ~of.clear).any() for of in found):
+    read = _shown(found)
+    told, clear = _tells(read), _tells(read.select(read.clear))
+    if not clear and (told or thorough):
         marked = np.any([of.seen > _MARKS for of in found], axis=0)
         dots, found = dots.select(marked), [of.select(marked) for of in found]
         if marked.any():
             found += [read_bands(gray, dots, code) for code in rivals if code not in narrow]
-    read = _shown(found)
-    if np.prod(1 - read.confidence) < _DOUBTED:
+        read = _shown(found)
+    if _tells(read):
         return read  # whose prints the others may have, too
     conceivable = np.any([of.confidence >= _CONCEIVABLE for of in found], axis=0)
     if conceivable.any():
@@ -177,6 +178,11 @@ def _read(
         some += [read_bands(gray, dots.select(conceivable), code) for code in narrow]
         read = _shown(some)
     return read
+
+
+def _tells(read: Hypotheses) -> bool:
+    """Return whether it is hardly possible that all words are wrong."""
+    return bool(np.prod(1 - read.confidence) < _DOUBTED)
 
 
 def _shown(found: Sequence[Hypotheses]) -> Hypotheses:
