@@ -40,7 +40,7 @@ from ahf_ros.vision.log_edges import LogEdges, edges_in_bands
 from ahf_ros.vision.pyramid import ImagePyramid, Octave, octaves
 
 _COLOURS = 1, -1  # of circles that are looked for
-_SMALLEST, _SMALL = 2.0, 11.5  # radii of circles that are looked for, px, also in the half
+_SMALLEST = 2.0  # radius of circles that are looked for, px
 _BEYOND = 1.1  # times a bound of the radius, by how much circles may be beyond it
 _INNERMOST = 0.25  # of the radii of circles that are looked for
 _COMMON_CENTRE = 8.0, 20.0  # radii of targets whose rings vote together, px
@@ -361,18 +361,11 @@ def _owned(gray: np.ndarray, rings: Aligned, polarity: int, family: CctagPrint) 
 
 
 def _circles(of_octaves: Sequence[Octave]) -> list[Dots]:
-    """Return dots that may be circles of targets of any colour, in px of each octave.
-
-    Small ones are voted for by the edges of two levels, of which the second are less noisy.
-    """
+    """Return dots that may be circles of targets of any colour, in px of each octave."""
     first, last = of_octaves[0], of_octaves[-1]
     pyramid, low = first.pyramid, first.radii[0]
     high = last.radii[1] * 2 ** (last.level - first.level)
     voted = voted_dots(pyramid, max(low * _INNERMOST, _SMALLEST), high, _COLOURS)
-    if len(pyramid.halves) > 1:
-        others = voted_dots(pyramid.half(1), max(low / 2, _SMALLEST), _SMALL, _COLOURS)
-        others = replace(others, frames=frame.enlarged(others.frames, 1))
-        voted = Dots.joined([voted, others])
     major = frame.ellipse_axes(voted.frames)[0]
     found = []
     for octave in of_octaves:
