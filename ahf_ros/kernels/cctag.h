@@ -119,13 +119,6 @@ static inline void add_products(count n, double normal[n][n], double right[n],
     }
 }
 
-static inline void mirror(count n, double normal[n][n])
-{
-    for (count a = 0; a < n; a++)
-        for (count b = 0; b < a; b++)
-            normal[a][b] = normal[b][a];
-}
-
 /* The inverse of a 3 x 3 matrix. */
 static inline void inverted(const double a[3][3], double b[3][3])
 {

@@ -74,9 +74,7 @@ void fitted_homographies(rows k, count m, const double points[k][m][2],
                 }
                 add_point(point, image, weight, greater(depth, least_depth), normal, right);
             }
-            for (int a = 0; a < UNKNOWNS; a++)
-                for (int b = 0; b < a; b++)
-                    normal[a][b] = normal[b][a];
+            mirror(UNKNOWNS, normal);
             memcpy(solved, normal, sizeof solved);
             memcpy(found, right, sizeof found);
             solve(UNKNOWNS, 1, solved, (double(*)[1])found);

@@ -4,7 +4,6 @@
 
 #include "elementary.h"
 #include "kernels.h"
-#include "robust.h"
 
 /* An index beyond an array of n is that of its mirror image, whose middle is the first or last. */
 static inline count mirrored(count i, count n)

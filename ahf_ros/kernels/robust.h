@@ -104,6 +104,14 @@ static inline void solve(count n, count m, double a[n][n], double b[n][m])
         }
 }
 
+/* The lower triangle of normal equations is that above the diagonal. */
+static inline void mirror(count n, double normal[n][n])
+{
+    for (count a = 0; a < n; a++)
+        for (count b = 0; b < a; b++)
+            normal[a][b] = normal[b][a];
+}
+
 static inline double dot(count n, const double a[n], const double b[n])
 {
     double sum = 0;

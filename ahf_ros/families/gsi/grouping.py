@@ -13,6 +13,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache, lru_cache, partial
 from itertools import pairwise
+from typing import Any
 
 import cv2
 import numpy as np
@@ -59,6 +60,9 @@ Nearest = Callable[[np.ndarray, np.ndarray, float], tuple[np.ndarray, np.ndarray
 Maps, shape (n, 2, 2), are those from px to the unit of the reach at each place. Beyond the reach a
 dot is -1.
 """
+
+Triples = Callable[..., tuple[np.ndarray, np.ndarray, np.ndarray]]
+"""`likely_triples`, with what it must know of dots and pairs."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -239,7 +243,8 @@ def find_templates(dots: Dots, family: PointPrint, *, obvious: bool = False) -> 
     error = _LENGTH_ERROR if few else _LENGTH_ERROR_OF_MANY
     pairs = neighbours(dots, family, triples, error, obvious=obvious)
     nearest = cache(partial(nearest_dots, centres, smallest / 3))
-    members = [_members(dots, pairs, nearest, family, triple) for triple in triples]
+    find = _triples_among(dots, pairs)
+    members = [_members(dots, pairs, find, nearest, family, triple) for triple in triples]
     groups = np.unique(np.concatenate(members), axis=0)
     if not len(groups):
         return nothing
@@ -266,6 +271,7 @@ def _triples(places: np.ndarray, reference: int, thorough: bool) -> list[tuple[i
 def _members(
     dots: Dots,
     pairs: Pairs,
+    find: Triples,
     nearest: Callable[[], Nearest],
     family: PointPrint,
     triple: tuple[int, int, int],
@@ -277,6 +283,7 @@ def _members(
     arms = (places - places[role]) / radius
     lengths = np.hypot(*arms.T)
     smallest, largest = radius_scales(family)
+    scales = np.log([smallest, largest])
     longest = lengths[partner] / smallest
     apart, shortest = np.abs(pairs.offset), lengths[partner] / largest
     likely = apart < longest + pairs.error_at(longest)
@@ -289,11 +296,11 @@ def _members(
     total = np.cumsum(end - begin)
     parts = np.searchsorted(total, np.arange(0, total[-1:].sum() + _PART, _PART))
     found = [np.zeros((0, len(places)), int)]
-    find = _likely_triples(dots, pairs, family, triple)
+    of_print = _plane_of(triple, family)
     for low, high in pairwise(parts):
         of_part = partners[low:high], begin[low:high], end[low:high]
         most = int((end - begin)[low:high].sum())
-        triples, affine, (count,) = find(*of_part, most=most)
+        triples, affine, (count,) = find(*of_print, pairs.error, scales, *of_part, most=most)
         if not count:
             continue
         members, affine = np.full((count, len(places)), -1), affine[:count]
@@ -311,27 +318,29 @@ def _members(
     return np.concatenate(found)
 
 
-def _likely_triples(
-    dots: Dots, pairs: Pairs, family: PointPrint, triple: tuple[int, int, int]
-) -> Callable[..., tuple[np.ndarray, np.ndarray, np.ndarray]]:
-    """Return the kernel that finds triples of dots, with what it must know of dots and print.
+def _triples_among(dots: Dots, pairs: Pairs) -> Triples:
+    """Return the kernel that finds triples, with what it must know of dots and pairs.
 
     A third dot is where the template has it, turned and scaled so that the partner is where a pair
     says. The ellipses of all three are those that their affine map implies; they may all be larger
     than printed or smaller, by one factor.
     """
     ellipses, minor = dots.frames[:, :2, :2], frame.ellipse_axes(dots.frames)[1]
-    radii = family.template_radii[[*triple]]
-    partner, third = (family.places[[*triple[1:]]] - family.places[triple[0]]) / radii[0]
-    turn = complex(*third) / complex(*partner)
     return partial(
         kernels.likely_triples,
         *(np.stack([pairs.first, pairs.second], axis=1), pairs.offset.view(float).reshape(-1, 2)),
         *(ellipses @ np.diag([1.0, -1.0]), frame.inverses(ellipses)),
-        *(_ELLIPSE_ERROR + _ELLIPSE_PIXELS / minor, (turn.real, turn.imag)),
-        *(np.linalg.inv(np.stack([partner, third], axis=1)), radii / radii[0]),
-        *(pairs.error, np.log(radius_scales(family))),
+        _ELLIPSE_ERROR + _ELLIPSE_PIXELS / minor,
     )
+
+
+def _plane_of(triple: tuple[int, int, int], family: PointPrint) -> tuple[Any, ...]:
+    """Return how three template dots lie in the print, as the kernel takes it."""
+    radii = family.template_radii[[*triple]]
+    partner, third = (family.places[[*triple[1:]]] - family.places[triple[0]]) / radii[0]
+    turn = complex(*third) / complex(*partner)
+    basis = np.linalg.inv(np.stack([partner, third], axis=1))
+    return (turn.real, turn.imag), basis, radii / radii[0]
 
 
 def _cross(first: np.ndarray, second: np.ndarray) -> np.ndarray:

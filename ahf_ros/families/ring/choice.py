@@ -165,7 +165,7 @@ def _read(
     read = _shown(found)
     told, clear = _tells(read), _tells(read.select(read.clear))
     if not clear and (told or thorough):
-        marked = np.any([of.seen > _MARKS for of in found], axis=0)
+        marked = np.any([(of.seen > _MARKS) | of.certain for of in found], axis=0)
         dots, found = dots.select(marked), [of.select(marked) for of in found]
         if marked.any():
             found += [read_bands(gray, dots, code) for code in rivals if code not in narrow]
@@ -192,9 +192,7 @@ def _shown(found: Sequence[Hypotheses]) -> Hypotheses:
     is of no other.
     """
     certain = np.array([of.certain & (of.coded > -DOUBT) for of in found])
-    better = np.array(
-        [np.where(own, odds(of), 0.0) for own, of in zip(certain, found, strict=True)]
-    )
+    better = np.where(certain, [odds(of) for of in found], 0.0)
     parts = [Hypotheses.joined(found).select(slice(0))]
     while certain.any():
         best = np.lexsort([better.sum(axis=1), certain.sum(axis=1)])[-1]
