@@ -2,10 +2,12 @@
 
 import ctypes
 import faulthandler
+import math
 import os
 import re
 import sys
 import threading
+import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from functools import partial
@@ -43,6 +45,9 @@ MAXIMUM_PARAMETERS = 1000
 ENDING = 60.0
 """Time that a node has to end in order, s; then it says where it waits, and ends at once."""
 
+PAUSE = 1e-3
+"""Time between two waits for messages of which the first ended with nothing, s."""
+
 _M_TRIM_THRESHOLD, _M_MMAP_THRESHOLD, _M_ARENA_MAX = -1, -3, -8  # of glibc's malloc.h
 
 _PLACE = re.compile(r',? at /\S+:\d+')  # in the sources of rcl, as its errors name it
@@ -65,8 +70,17 @@ class Ending(Future):
             super().add_done_callback(callback)
 
 
-class JoiningExecutor(MultiThreadedExecutor):
-    """An executor whose shutdown waits for callbacks, which rclpy's does not up to Kilted."""
+class PatientExecutor(MultiThreadedExecutor):
+    """An executor that waits where rclpy's does not, up to Kilted.
+
+    Its shutdown waits for callbacks. While a part of a large message has not arrived, Fast DDS
+    ends each wait at once, with nothing: thousands of waits a second took a processor, which the
+    part needed, too. So the next wait begins after a pause.
+    """
+
+    def __init__(self, num_threads: int) -> None:
+        super().__init__(num_threads)
+        self._waited, self._condition = -math.inf, lambda: False
 
     def spin_until(self, ended: Future) -> None:
         """Run callbacks until a future is done.
@@ -77,6 +91,23 @@ class JoiningExecutor(MultiThreadedExecutor):
         while not ended.done():
             with suppress(InvalidHandle):
                 self.spin_until_future_complete(ended)
+
+    def wait_for_ready_callbacks(
+        self,
+        timeout_sec: Any = None,
+        nodes: Any = None,
+        condition: Callable[[], bool] = lambda: False,
+    ) -> Any:
+        """Return a callback that is ready; rclpy asks for the condition before each wait."""
+        self._waited, self._condition = -math.inf, condition
+        return super().wait_for_ready_callbacks(timeout_sec, nodes, self._after_pause)
+
+    def _after_pause(self) -> bool:
+        """Return whether the condition holds, after a pause if the last wait ended at once."""
+        if time.monotonic() - self._waited < PAUSE:
+            time.sleep(PAUSE)
+        self._waited = time.monotonic()
+        return self._condition()
 
     def shutdown(self, timeout_sec: float | None = None) -> bool:
         """Wait until the callbacks that have begun have ended, then shut down."""
@@ -228,7 +259,7 @@ def run(make_node: Callable[[], ProcessNode], arguments: list[str] | None = None
     threading.Thread(target=_end_at_signal, args=(node.ended, arrived), daemon=True).start()
     # One thread for a service that takes as long as an identification, one for an image that is
     # written to disk, one for everything short.
-    executor = JoiningExecutor(num_threads=3)
+    executor = PatientExecutor(num_threads=3)
     executor.add_node(node)
     try:
         executor.spin_until(node.ended)

@@ -3,7 +3,6 @@
 import os
 import subprocess
 import sys
-import threading
 from pathlib import Path
 from typing import Any
 
@@ -12,12 +11,10 @@ import pytest
 pytest.importorskip('rclpy', reason='ROS 2 is not installed')
 
 import numpy as np
-import rclpy
 from sensor_msgs.msg import Image
 from std_msgs.msg import Header
 
 from ahf_ros.nodes.messages import image_message
-from ahf_ros.nodes.process import JoiningExecutor
 from ahf_ros.nodes.start import NODES
 from support import live, packages
 from support.detector import DetectorProcess, overrides
@@ -180,24 +177,3 @@ def test_a_detector_of_another_package_does_not_end_the_node_without_a_word(
     status, errors = node.process.end()
     assert status == 0
     assert f'image refused: {reason}' in errors
-
-
-def test_the_end_waits_for_callbacks(graph: Any) -> None:
-    began, released = threading.Event(), threading.Event()
-    ended: list[bool] = []
-
-    def callback() -> None:
-        began.set()
-        ended.append(released.wait(live.PATIENCE))
-
-    node = rclpy.create_node('ending')
-    timer = node.create_timer(0.001, callback)
-    executor = JoiningExecutor(num_threads=2)
-    executor.add_node(node)
-    while not began.is_set():
-        executor.spin_once(timeout_sec=0.01)
-    threading.Timer(0.2, released.set).start()
-    executor.shutdown()
-    assert ended[0]
-    node.destroy_timer(timer)
-    node.destroy_node()
