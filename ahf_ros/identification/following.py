@@ -26,6 +26,7 @@ from ahf_ros.vision.faint_targets import displaced
 from ahf_ros.vision.noise import usual_noise
 from ahf_ros.vision.parts import Part, area, joined
 
+_APART = 64  # rows, of which few tell that an image is another one
 _AROUND = 1.6  # half the side of what is looked for again, in semi-axes of a target's ellipse
 _FARTHEST = 1.5  # by which a target may have moved, in its semi-axes
 _BESIDE = 2  # pixels of the smaller image by which targets move differently
@@ -42,7 +43,7 @@ _STEP = 3  # gray values, beside noise
 _EVERY = 4  # pixels of the half, one of which tells how light has changed
 _DARK = 16  # gray value below which steps of gray values are too coarse to tell it
 _AT_LEAST = 32  # px about what has changed
-_SIDE = 480  # px, usual side of a part that is searched though it seems not to have changed
+_SIDE = 640  # px, usual side of a part that is searched though it seems not to have changed
 _EACH = 100_000  # px, to which the search of a part amounts whatever its size is
 _MOST, _FEW = 0.3, 50  # share of an image that is searched in parts, and their number
 
@@ -77,7 +78,7 @@ class Following:
         before : Seen
             In the image before.
         """
-        if np.array_equal(before.image, image):
+        if _is_still(before.image, image):
             return replace(before, still=before.still + 1)
         after = self._followed(image, before) if before.image.shape == image.shape else None
         # The caller may take the next image into the same array.
@@ -147,6 +148,11 @@ class Following:
         for left, top, across, down, _ in (2 * _TILE * found[1:]).tolist():
             part = left, top, left + across, top + down
             yield _grown(part, margin, (2 * height, 2 * width))
+
+
+def _is_still(before: np.ndarray, image: np.ndarray) -> bool:
+    """Return whether two images are the same; most that are not differ in any few rows."""
+    return all(np.array_equal(before[rows], image[rows]) for rows in (np.s_[::_APART], np.s_[:]))
 
 
 def _where(image: np.ndarray, known: Sequence[Target]) -> list[Target]:
@@ -298,7 +304,8 @@ def _gain(now: np.ndarray, then: np.ndarray) -> float:
     """Return by how much all gray values have grown, as a factor."""
     now, then = (it[::_EVERY, ::_EVERY] for it in (now, then))
     telling = (then >= _DARK) & (np.maximum(now, then) < 255)
-    return float(np.median(now[telling] / then[telling])) if telling.any() else 1.0
+    ratios = np.divide(now[telling], then[telling], dtype=np.float32)
+    return float(np.median(ratios)) if ratios.size else 1.0
 
 
 def _part(shape: tuple[int, int], turn: int, interval: int) -> Part | None:
