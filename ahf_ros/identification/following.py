@@ -45,7 +45,7 @@ _DARK = 16  # gray value below which steps of gray values are too coarse to tell
 _AT_LEAST = 32  # px about what has changed
 _SIDE = 640  # px, usual side of a part that is searched though it seems not to have changed
 _EACH = 100_000  # px, to which the search of a part amounts whatever its size is
-_MOST, _FEW = 0.3, 50  # share of an image that is searched in parts, and their number
+_MOST, _FEW = 0.5, 50  # share of an image that is searched in parts, and their number
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,8 +104,10 @@ class Following:
         parts = [*self._places(lost, image.shape)]
         if turn:
             parts.append(_grown(turn, math.ceil(max(reach, _AT_LEAST)), image.shape))
-        changed = _changed(image, before.image, movement, reach)
+        changed, entering = _changed(image, before.image, movement, reach)
         changes = [*self._changes(changed, followed, math.ceil(max(2 * reach, _AT_LEAST)))]
+        for it in entering:
+            changes += self._changes(it, followed, _AT_LEAST)
         parts += changes
         parts = joined(parts, _EACH) if len(parts) <= _FEW else parts
         if sum(map(area, parts)) > _MOST * image.size or len(parts) > _FEW:
@@ -266,12 +268,12 @@ def _of_corners(shape: tuple[int, ...], movement: np.ndarray) -> np.ndarray:
 
 def _changed(
     image: np.ndarray, before: np.ndarray, movement: np.ndarray, reach: float
-) -> np.ndarray:
+) -> tuple[np.ndarray, list[np.ndarray]]:
     """Return where the half of an image is not what it was, or lies next to it; uint8, 1 or 0.
 
     Light may be brighter or darker as a whole, as that of lamps in the beat of the mains, or to
-    another exposure. What is there as far from a side that moves into the image as targets reach
-    is new, too.
+    another exposure. Along each side that moves into the image, all that is there is new, as far
+    as targets reach that are only now seen as a whole: the second result has a mask for each.
     """
     height, width = image.shape
     now, then = (
@@ -284,20 +286,37 @@ def _changed(
     above = cv2.subtract(now, cv2.dilate(cv2.LUT(then, most), beside))
     below = cv2.subtract(cv2.erode(cv2.LUT(then, least), beside), now)
     difference = cv2.max(above, below)
-    right, down = _of_corners(image.shape, movement).max(axis=0) > _STILL
-    left, up = _of_corners(image.shape, movement).min(axis=0) < -_STILL
-    deep = math.ceil(reach)  # px of the half, twice as far
-    enters = (
-        (right, np.s_[:, :deep]),
-        (left, np.s_[:, -deep:]),
-        (down, np.s_[:deep]),
-        (up, np.s_[-deep:]),
-    )
-    for strip in (of for it_enters, of in enters if it_enters):
-        shown = now[strip]
-        difference[strip] = cv2.subtract(cv2.dilate(shown, beside), cv2.erode(shown, beside))
     limit = _NOISE * usual_noise(now) + _STEP
-    return cv2.threshold(difference, limit, 1, cv2.THRESH_BINARY)[1]
+    deep = math.ceil(reach)  # px of the half, twice as far
+    entering = []
+    for strip in _entering(image.shape, movement, deep):
+        shown = now[strip]
+        difference[strip], beyond = 0, np.zeros_like(now)
+        beyond[strip] = cv2.subtract(cv2.dilate(shown, beside), cv2.erode(shown, beside))
+        entering.append(_over(beyond, limit))
+    return _over(difference, limit), entering
+
+
+def _entering(
+    shape: tuple[int, ...], movement: np.ndarray, deep: int
+) -> Iterator[tuple[slice, ...]]:
+    """Yield the strips, of a depth in px, along the sides that move into an image."""
+    moves = _of_corners(shape, movement)
+    right, down = moves.max(axis=0) > _STILL
+    left, up = moves.min(axis=0) < -_STILL
+    if right:
+        yield np.s_[:, :deep]
+    if left:
+        yield np.s_[:, -deep:]
+    if down:
+        yield np.s_[:deep, :]
+    if up:
+        yield np.s_[-deep:, :]
+
+
+def _over(values: np.ndarray, limit: float) -> np.ndarray:
+    """Return where values are over a limit, uint8, 1 or 0."""
+    return cv2.threshold(values, limit, 1, cv2.THRESH_BINARY)[1]
 
 
 def _gain(now: np.ndarray, then: np.ndarray) -> float:

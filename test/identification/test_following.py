@@ -1,6 +1,6 @@
 """Targets that are followed: the results are those of a fresh search, in less time."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from itertools import pairwise
 
@@ -8,10 +8,15 @@ import numpy as np
 import pytest
 
 from ahf_ros.base.target import Identification, Target
+from ahf_ros.families import DetectorSettings, create_detector
+from ahf_ros.families.contract import Confirmed
 from ahf_ros.families.explained import without_targets
+from ahf_ros.identification.filtering.identifier import Seen
+from ahf_ros.identification.following import Following
 from ahf_ros.identification.session import create_identifier
 from ahf_ros.identification.session_settings import IdentificationSettings
 from ahf_ros.scenes.scene import SceneSettings, render
+from ahf_ros.vision.parts import Part, area
 from support.calls import calls_of
 
 WALL = SceneSettings(width=1000, height=700, targets=8, dot_radius=8.0, seed=4, full_well=0.0)
@@ -106,6 +111,33 @@ def test_targets_are_covered_uncovered_and_replaced() -> None:
     moved = next(it for it in another if it.id == second.id)
     assert np.hypot(moved.x - left, moved.y - top) < 2
     assert len(followed(another)) == len(wall.targets) - 2
+
+
+def test_targets_enter_with_a_camera_that_pans() -> None:
+    wall = render(replace(STRIPES, targets=20, dot_radius=6.0))
+    views = [noisy(wall.image[5 * it :, 8 * it :][:500, :700], it) for it in range(20)]
+    prints = create_identifier(**FAMILY).identify(views[0]).prints
+    detector, searched = create_detector('ring', settings=DetectorSettings(family=WALL.family)), []
+
+    def confirm(image: np.ndarray, targets: Sequence[Target]) -> Confirmed:
+        again = detector.confirm(image, targets)
+
+        def search(parts: Sequence[Part]) -> list[Target]:
+            searched.append(sum(map(area, parts)))
+            return again.search(parts)
+
+        return replace(again, search=search)
+
+    follow = Following(detector, confirm, prints, 30)
+    seen = Seen(views[0], tuple(detector(views[0])))
+    entered = set()
+    for view in views[1:]:
+        known = {it.print for it in seen.targets}
+        seen = follow(view, seen)
+        assert {it.print for it in seen.targets} == {it.print for it in detector(view)}
+        entered |= {it.print for it in seen.targets} - known
+    assert len(entered) >= 3
+    assert np.median(searched) < 0.6 * views[0].size
 
 
 def test_a_camera_that_jumps_searches_wholly() -> None:

@@ -52,7 +52,7 @@ def dots_in(
     found, size = [NO_DOTS], 2**octave.level
     for part in parts:
         # With its band, a target is at least twice as wide as its dot.
-        if 4 * octave.radii[0] * size <= max(part.pyramid.image.shape) or not octave.level:
+        if 4 * octave.radii[0] * size <= min(part.pyramid.image.shape) or not octave.level:
             of_part = replace(octave, pyramid=part.pyramid.half(octave.level))
             dots = search(of_part, explained.moved(-part.x, -part.y))
             frames = frame.translated(dots.frames, part.x / size, part.y / size)
