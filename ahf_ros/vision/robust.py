@@ -55,11 +55,6 @@ def spread(sizes: np.ndarray, selected: np.ndarray, minimum: float) -> np.ndarra
     return np.maximum(NORMAL * median(sizes, selected), minimum)[:, None]
 
 
-def cauchy(weights: np.ndarray | float, errors: np.ndarray) -> np.ndarray:
-    """Return weights after Cauchy: halved where the error is 1."""
-    return weights / (1 + errors**2)
-
-
 def geman_mcclure_gain(weights: np.ndarray, errors: np.ndarray) -> np.ndarray:
     """Return the derivative of an error times Geman and McClure's weight, by the error."""
     squares = errors**2

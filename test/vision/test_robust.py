@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from ahf_ros.vision.robust import (
-    cauchy,
     fit_linear,
     geman_mcclure_gain,
     median,
@@ -25,11 +24,6 @@ def test_the_spread_of_normal_errors_is_their_deviation_despite_outliers() -> No
     everything = np.ones_like(errors, bool)
     assert robust_spread(errors, everything, 0.1)[0, 0] == pytest.approx(2.0, rel=0.1)
     assert robust_spread(0 * errors, everything, 0.1).tolist() == [[0.1]]
-
-
-def test_weights_at_an_error_of_one() -> None:
-    errors = np.array([0.0, 1.0, 100.0])
-    assert cauchy(2.0, errors) == pytest.approx([2, 1, 0], abs=1e-3)
 
 
 def test_the_gain_is_the_derivative_of_the_weighted_error() -> None:

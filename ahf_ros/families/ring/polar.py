@@ -158,14 +158,6 @@ class PolarImages(ArrayRecord):
         ink = _along(np.where(dark, self.contrast, 1 / self.contrast), seen).astype(np.float32)
         return np.asarray(seen / (1 + share * (ink - 1)))
 
-    def tells(self, values: np.ndarray) -> np.ndarray:
-        """Return whether gray values (k, ...) tell paper from ink, as white does that is either.
-
-        White paper may be ink under glare, but white ink on dark ground is ink.
-        """
-        white = np.isinf(self.glare) | (self.polarity < 0)
-        return np.asarray((values < SATURATED) | _along(white, values))
-
     def logs(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return ln(I + offset) of gray values (k, ...), and the deviation of its noise."""
         raised = np.maximum(values, 0) + np.float32(LOG_OFFSET)
