@@ -300,17 +300,15 @@ def _changed(
 def _entering(
     shape: tuple[int, ...], movement: np.ndarray, deep: int
 ) -> Iterator[tuple[slice, ...]]:
-    """Yield the strips, of a depth in px, along the sides that move into an image."""
-    moves = _of_corners(shape, movement)
-    right, down = moves.max(axis=0) > _STILL
-    left, up = moves.min(axis=0) < -_STILL
-    if right:
+    """Yield the strips, of a depth in px, along the sides of which a corner moves inwards."""
+    (x, y) = _of_corners(shape, movement).T
+    if max(x[0], x[2]) > _STILL:
         yield np.s_[:, :deep]
-    if left:
+    if min(x[1], x[3]) < -_STILL:
         yield np.s_[:, -deep:]
-    if down:
+    if max(y[0], y[1]) > _STILL:
         yield np.s_[:deep, :]
-    if up:
+    if min(y[2], y[3]) < -_STILL:
         yield np.s_[-deep:, :]
 
 
