@@ -121,13 +121,14 @@ class SeveralDetector:
         shared = sum(isinstance(it, Searching) for it in self.parts) > 1
         common = CommonSearch(self.settings.radii[0], self.settings.polarities)
         pyramid: ImagePyramid | None = None
-        dots: np.ndarray | None = None  # that no target explains, once these are known
+        dots: np.ndarray | None = None  # that no target explains, once these are known...
+        looked = 0  # ... from edges of this contrast
         results: list[list[Target]] = []
         left = image
         for each in self.parts:
             part = each if left is image else unstretched(each)
-            together = shared and isinstance(part, Searching)
-            nothing = together and left is not image and dots is not None and not len(dots)
+            same = shared and isinstance(part, Searching) and part.contrast == looked
+            nothing = same and left is not image and dots is not None and not len(dots)
             if nothing or left.min() == left.max():  # all that there was is painted over
                 results.append([])
                 continue
@@ -136,7 +137,7 @@ class SeveralDetector:
                     pyramid = None  # before there is another one: it takes much memory
                 pyramid = pyramid or self._pyramid(left, part.contrast, common)
             if pyramid and isinstance(part, Explaining):
-                found, dots = part.explain(pyramid)
+                (found, dots), looked = part.explain(pyramid), pyramid.contrast
                 dots = None if self.settings.report_undecoded else dots
             elif pyramid and isinstance(part, Searching):
                 found = part.search(pyramid)

@@ -74,6 +74,15 @@ def test_kinds_that_share_a_search_of_dots_are_all_found(light: str) -> None:
     assert np.allclose([places[it.key] for it in found], [(it.x, it.y) for it in found], atol=0.05)
 
 
+@pytest.mark.parametrize('name, radius', [('gsi', 5), ('dots', 8), ('cctag3', 8), ('cctag4', 10)])
+def test_other_kinds_are_found_beside_rings_that_are_clear(name: str, radius: float) -> None:
+    size = replace(SMALL, width=480, height=480)
+    rings = rendered(replace(size, targets=4))
+    others = rendered(replace(size, family=name, targets=2, dot_radius=radius))
+    found = create_detector(family='auto')(np.hstack([rings.image, others.image]))
+    assert {it.key for it in found} == {it.key for it in (*rings.targets, *others.targets)}
+
+
 def without_time(found: Identification) -> Identification:
     return replace(found, filter=replace(found.filter, duration=0.0))
 
