@@ -44,9 +44,12 @@ def choose_families(gray: np.ndarray, dots: Fit, families: Sequence[RingPrint]) 
 
 
 def further_families(
-    gray: np.ndarray, dots: Fit, families: Sequence[RingPrint]
+    gray: np.ndarray, dots: Fit, families: Sequence[RingPrint], shown: Sequence[RingPrint] = ()
 ) -> list[RingPrint]:
-    """Return the same for dots that no family explains, most of which are none of targets."""
+    """Return the same for dots that no family explains, most of which are none of targets.
+
+    A family with more words may have the prints of those that were shown before.
+    """
     dots = dots.select(dots.share >= ENOUGH)
     dots = dots.select(dots.clearest(_OTHERS))
     if not families or not len(dots.frames):
@@ -54,20 +57,22 @@ def further_families(
     finest = {code.band: code.bits for code in sorted(families, key=lambda code: code.bits)}
     mean = bounds(gray, dots, list(finest.items()), _ROUGH).max(axis=0)
     order = np.argsort(-mean, kind='stable')[: np.count_nonzero(mean > _CLEAR)][:_CLEAREST]
-    return present_families(_words_shown(gray, dots.select(order), families))[0]
+    first = [(code.band, code.bits) for code in shown]
+    return present_families(_words_shown(gray, dots.select(order), families, first))[0]
 
 
 def _words_shown(
     gray: np.ndarray,
     dots: Fit,
     families: Sequence[RingPrint],
+    first: Sequence[Print] = (),
     tried: int = _PRINTS,
     most: int = _LIKELIEST,
 ) -> list[dict[RingPrint, int]]:
     """Return words of the likeliest print of some dots that has any, by family.
 
-    So many prints are tried at the most, on so many of the likeliest dots, of the likeliest print
-    on a sample first, as it is nearly always the right one.
+    So many prints are tried at the most, `first` ones before all others, on so many of the
+    likeliest dots; the first print on a sample first, as it is nearly always the right one.
     """
     prints = list(dict.fromkeys((code.band, code.bits) for code in families))
     mean = bounds(gray, dots, prints)
@@ -78,7 +83,8 @@ def _words_shown(
     likely = mean > mean.max(axis=0) - _NEARLY
     known: list[Print] = []
     ranks = 0
-    for best in _likeliest(prints, np.maximum(mean, 0)):
+    ordered = _likeliest(prints, np.maximum(mean, 0))
+    for best in sorted(ordered, key=lambda it: prints[it] not in first):
         if prints[best] in known or ranks == tried:
             continue
         read: list[Hypotheses] = []
@@ -87,7 +93,7 @@ def _words_shown(
         if not len(likeliest):
             continue
         alike = _alike(prints, mean[:, likeliest[:_SAMPLE]], best)
-        known += alike
+        known += [prints[best]] if prints[best] in first else alike
         same = [code for code in families if _has_any(code, prints[best : best + 1])]
         rivals = [code for code in families if _has_any(code, alike) and code not in same]
         ends = [0, most] if ranks else [0, _SAMPLE, most]

@@ -43,6 +43,7 @@ from ahf_ros.families.ring.proposals import (
     with_rims,
 )
 from ahf_ros.families.ring.refinement import refine_centres
+from ahf_ros.families.ring.rivals import has_all
 from ahf_ros.families.undecoded import undecoded
 from ahf_ros.prints.ring import RingPrint
 from ahf_ros.vision import frame
@@ -257,11 +258,13 @@ def read_pyramid(
         while left := [code for code in families if code not in shown]:
             part = octave.pyramid.gray
             rest = seen.left(dots, octave.level)
-            codes = further_families(part, rest, left)
+            codes = further_families(part, rest, left, shown)
             if not codes:
                 break
-            if not shown:
-                return again(codes)
+            # What a family has read whose words another one has all is of that one as well.
+            kept = [of for of in shown if not any(has_all(code, of) for code in codes)]
+            if len(kept) < len(shown) or not shown:
+                return again([*kept, *codes])
             clear = seen.explained.select(seen.explained.clear)
             dots = dots.select(~clear.on_them(dots.frames, octave.level))
             likely, _ = measure_likely(part, dots, codes)

@@ -145,18 +145,13 @@ def present_families(
     and what it takes to say which of the families of the image it is of. One family is likelier,
     and one whose words follow a rule. A family of more words would hardly show only these.
     """
-    left, present, sure = list(prints), [], set()
-    while left:
-        count = Counter(chain.from_iterable(left))
-        most = max(len(code.words) for code in count)
-        best = min(
-            count,
-            key=lambda code: (
-                _nats(count[code], len(code.words), len(left) - count[code], most)
-                - np.log(_before(code)),
-                len(code.words),
-            ),
-        )
+    present, sure = _covering(prints), set()
+    for code in tuple(present):  # what came first may be needless beside what came later
+        fewer = [it for it in present if it is not code]
+        if _nats(prints, fewer) < _nats(prints, present):
+            present = fewer
+    left = list(prints)
+    for best in present:
         covered = [of for of in left if best in of]
         different = len({of[best] for of in covered})
         rivals = set.intersection(*(set(of) for of in covered)) - {best}
@@ -164,21 +159,52 @@ def present_families(
             (len(best.words) / len(code.words)) ** different * _before(code) / _before(best)
             for code in rivals
         )
-        present.append(best)
         if sum(odds) < _DOUBT:
             sure.add(best)
         left = [of for of in left if best not in of]
     return present, sure
 
 
+def _covering(prints: Sequence[dict[RingPrint, int]]) -> list[RingPrint]:
+    """Return families that have all prints, one by one the best with any others of most words."""
+    left: list[dict[RingPrint, int]] = list(prints)
+    found = []
+    while left:
+        count = Counter(chain.from_iterable(left))
+        most, every = max(len(code.words) for code in count), len(left)
+        best = min(
+            count,
+            key=lambda code: (
+                _of_family(code, count[code], every)
+                + _of_words(every - count[code], most, every)
+                - (count[code] < every) * np.log(_DOUBT),
+                len(code.words),
+            ),
+        )
+        found.append(best)
+        left = [of for of in left if best not in of]
+    return found
+
+
+def _nats(prints: Sequence[dict[RingPrint, int]], families: Sequence[RingPrint]) -> float:
+    """Return what prints cost, each as one of the first family that has it, or infinity."""
+    left, nats = list(prints), (1 - len(families)) * np.log(_DOUBT)
+    for code in families:
+        others = [of for of in left if code not in of]
+        nats += _of_family(code, len(left) - len(others), len(prints))
+        left = others
+    return np.inf if left else float(nats)
+
+
+def _of_family(code: RingPrint, own: int, every: int) -> float:
+    return _of_words(own, len(code.words), every) - float(np.log(_before(code)))
+
+
+def _of_words(own: int, words: int, every: int) -> float:
+    """Return what it costs to say so many prints of a family, and that they are of it."""
+    return float(own * (np.log(words) - np.log(max(own, 1) / every)))
+
+
 def _before(code: RingPrint) -> float:
     """Return the odds of a family before any print is seen."""
     return _ALL_WORDS if code.has_all_words else 1.0
-
-
-def _nats(own: int, words: int, others: int, most: int) -> float:
-    """Return what prints cost: `own` in a family of some words, others in further ones of most."""
-    every = own + others
-    mixed = -own * np.log(own / every) - others * np.log(max(others, 1) / every)
-    further = -np.log(_DOUBT) if others else 0.0
-    return float(own * np.log(words) + others * np.log(most) + mixed + further)
