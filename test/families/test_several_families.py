@@ -205,6 +205,29 @@ def test_no_word_stands_that_a_family_found_later_explains_better(
     assert matches(identified(shown.image, family=','.join(RING_NAMES)), truth)
 
 
+@pytest.mark.parametrize(
+    ('names', 'light', 'seed'),
+    [
+        (('metashape16', 'cct14'), 'normal', 21),
+        (('cct12', 'cct14'), 'normal', 22),
+        (('cct10', 'cct14'), 'stripe', 24),
+        (('cct12', 'cct14'), 'stripe', 24),
+    ],
+)
+def test_two_families_are_told_apart_though_a_third_has_some_of_their_prints(
+    names: tuple[str, str], light: str, seed: int
+) -> None:
+    """The prints of cct14 are partly those of aicon14, with fewer words, and of cct12 alike."""
+    size = SceneSettings(width=600, height=600, targets=5, dot_radius=9, light=light, ambient=0.3)
+    shown = [
+        rendered(replace(size, family=name, targets=count, seed=seed + more))
+        for name, count, more in zip(names, (5, 3), (0, 100), strict=True)
+    ]
+    image = np.hstack([it.image for it in shown])
+    found = identified(image, family=','.join(RING_NAMES))
+    assert {it.key for it in found} == {it.key for of in shown for it in of.targets}
+
+
 def test_words_tell_the_number_of_sectors_where_light_makes_all_numbers_alike() -> None:
     """Bounds of 12, 14, 16 and 20 sectors differ by a fiftieth there, and 20 have the highest."""
     light = {'light': 'dense_lattice', 'ambient': 0.12}

@@ -83,6 +83,15 @@ def test_other_kinds_are_found_beside_rings_that_are_clear(name: str, radius: fl
     assert {it.key for it in found} == {it.key for it in (*rings.targets, *others.targets)}
 
 
+def test_rings_of_all_words_are_found_beside_markers_under_stripes() -> None:
+    """Cells look more like bands there than the rings that the first family left."""
+    size = replace(SMALL, width=700, height=700, light='stripe', ambient=0.4)
+    rings = rendered(replace(size, family='cct12', targets=4, dot_radius=9))
+    markers = rendered(replace(size, family='apriltag_36h11', dot_radius=12, seed=4))
+    found = create_detector(family='auto')(np.hstack([rings.image, markers.image]))
+    assert {it.key for it in found} == {it.key for it in (*rings.targets, *markers.targets)}
+
+
 def without_time(found: Identification) -> Identification:
     return replace(found, filter=replace(found.filter, duration=0.0))
 
