@@ -16,7 +16,7 @@ from ahf_ros.families.ring.families import present_families, words_shown
 from ahf_ros.families.ring.hypotheses import Hypotheses
 from ahf_ros.families.ring.proposals import HOPEFUL, Print, bounds, measure_likely
 from ahf_ros.families.ring.reading import read_bands
-from ahf_ros.families.ring.rivals import has_all, odds
+from ahf_ros.families.ring.rivals import has_more, odds
 from ahf_ros.prints.ring import RingPrint
 from ahf_ros.vision.circle_fit import ENOUGH, Fit
 
@@ -162,11 +162,7 @@ def _read(
     """
     dots, _ = measure_likely(gray, dots, None)
     every = [*families, *rivals]
-    narrow = [
-        code
-        for code in every
-        if any(has_all(of, code) and len(code.words) < len(of.words) for of in every)
-    ]
+    narrow = [code for code in every if any(has_more(of, code) for of in every)]
     found = [read_bands(gray, dots, code) for code in families if code not in narrow]
     read = _shown(found)
     told, clear = _tells(read), _tells(read.select(read.clear))

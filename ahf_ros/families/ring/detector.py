@@ -43,7 +43,7 @@ from ahf_ros.families.ring.proposals import (
     with_rims,
 )
 from ahf_ros.families.ring.refinement import refine_centres
-from ahf_ros.families.ring.rivals import has_all
+from ahf_ros.families.ring.rivals import has_more
 from ahf_ros.families.undecoded import undecoded
 from ahf_ros.prints.ring import RingPrint
 from ahf_ros.vision import frame
@@ -261,8 +261,8 @@ def read_pyramid(
             codes = further_families(part, rest, left, shown)
             if not codes:
                 break
-            # What a family has read whose words another one has all is of that one as well.
-            kept = [of for of in shown if not any(has_all(code, of) for code in codes)]
+            # A family with all words of one that was shown, and more, reads for both.
+            kept = [of for of in shown if not any(has_more(code, of) for code in codes)]
             if len(kept) < len(shown) or not shown:
                 return again([*kept, *codes])
             clear = seen.explained.select(seen.explained.clear)

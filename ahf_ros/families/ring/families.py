@@ -18,7 +18,7 @@ from ahf_ros.families.claims import leading, within
 from ahf_ros.families.ring.hypotheses import Hypotheses
 from ahf_ros.families.ring.known import NOTHING_KNOWN, Prior
 from ahf_ros.families.ring.reading import read_bands
-from ahf_ros.families.ring.rivals import against_rivals, has_all, odds
+from ahf_ros.families.ring.rivals import against_rivals, has_more, odds
 from ahf_ros.prints.ring import RingPrint, canonical, words_of_prints
 from ahf_ros.vision import frame
 from ahf_ros.vision.circle_fit import Fit
@@ -53,9 +53,7 @@ def read_families(
 def _narrowest(words: dict[RingPrint, int]) -> dict[RingPrint, int]:
     """Return words of a print without those of families that have all words of another one."""
     return {
-        code: word
-        for code, word in words.items()
-        if not any(has_all(code, of) and len(of.words) < len(code.words) for of in words)
+        code: word for code, word in words.items() if not any(has_more(code, of) for of in words)
     }
 
 

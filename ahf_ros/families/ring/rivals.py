@@ -111,6 +111,11 @@ def has_all(code: RingPrint, other: RingPrint) -> bool:
     return same and bool(code.has(other.words).all())
 
 
+def has_more(code: RingPrint, other: RingPrint) -> bool:
+    """Return whether a family has all words of another one, and further ones."""
+    return has_all(code, other) and len(code.words) > len(other.words)
+
+
 def odds(read: Hypotheses) -> np.ndarray:
     """Return how well words of any family agree with arcs, -inf if they are not certain, (k,)."""
     choices = [len(code.words) * code.bits for code in read.families]
