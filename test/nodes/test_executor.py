@@ -28,6 +28,12 @@ class Vain(Waitable):
         self._guard = GuardCondition(None, None)
         self.waits = 0
 
+    def __enter__(self) -> None:
+        """Begin a wait."""
+
+    def __exit__(self, *_: object) -> None:
+        """End it."""
+
     def get_num_entities(self) -> NumberOfEntities:
         return NumberOfEntities(0, 1)
 
