@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ahf_ros.families.ring.decoding import DOUBT
-from ahf_ros.families.ring.families import present_families, words_shown
+from ahf_ros.families.ring.families import covering_families, words_shown
 from ahf_ros.families.ring.hypotheses import Hypotheses
 from ahf_ros.families.ring.proposals import HOPEFUL, Print, bounds, measure_likely
 from ahf_ros.families.ring.reading import read_bands
@@ -40,7 +40,7 @@ def choose_families(gray: np.ndarray, dots: Fit, families: Sequence[RingPrint]) 
     Only their likeliest print is tried, on the likeliest of them.
     """
     clearest = dots.select(dots.clearest(_CLEAREST))
-    return present_families(_words_shown(gray, clearest, families, tried=1, most=_SAMPLE))[0]
+    return covering_families(_words_shown(gray, clearest, families, tried=1, most=_SAMPLE))
 
 
 def further_families(
@@ -58,7 +58,7 @@ def further_families(
     mean = bounds(gray, dots, list(finest.items()), _ROUGH).max(axis=0)
     order = np.argsort(-mean, kind='stable')[: np.count_nonzero(mean > _CLEAR)][:_CLEAREST]
     first = [(code.band, code.bits) for code in shown]
-    return present_families(_words_shown(gray, dots.select(order), families, first))[0]
+    return covering_families(_words_shown(gray, dots.select(order), families, first))
 
 
 def _words_shown(

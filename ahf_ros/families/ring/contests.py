@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 
@@ -10,6 +11,7 @@ from ahf_ros.families.claims import Rivals, leading, owners, sole_owners, surer,
 from ahf_ros.families.ring.confidence import COVERED
 from ahf_ros.families.ring.decoding import CLEAR
 from ahf_ros.families.ring.hypotheses import Hypotheses
+from ahf_ros.families.ring.rivals import has_all
 from ahf_ros.vision import frame
 from ahf_ros.vision.shape_votes import NEIGHBOURS
 
@@ -28,7 +30,8 @@ def among_others(hypotheses: Hypotheses) -> Hypotheses:
 
     Targets of one image share a family. Whole bands that arcs of any length explain better than
     words, and targets that do not look like their print are foreign. Among these a word is one by
-    chance, unless more targets share its family and its colour, which most targets of an image do;
+    chance, unless more targets share its family and its colour, which most targets of an image do,
+    also by words of a family of which its own has all;
     and it is arcs of any length, unless it explains its band better. What is not certain among
     these speaks for no other word of its family. Targets that are close to each other have much
     the same shape, which a word that is one by chance has not.
@@ -54,13 +57,14 @@ def _among(
     """
     left = hypotheses.confidence.copy()
     evidence = likely.certain * likely.confidence
-    kinds = [(code, sign) for code in dict.fromkeys(hypotheses.families) for sign in (1, -1)]
-    for code, sign in kinds:
-        of_family = hypotheses.families == code
-        own = of_family & (hypotheses.polarity == sign)
+    families = list(dict.fromkeys(hypotheses.families))
+    for code, sign in product(families, (1, -1)):
+        of_family, of_colour = hypotheses.families == code, hypotheses.polarity == sign
+        has_words = np.isin(hypotheses.families, [it for it in families if has_all(code, it)])
+        own = of_family & of_colour
         sure, others = hypotheses.confidence[own], foreign[own].sum()
-        unlike = _OTHER_COLOUR * evidence[of_family & ~own].sum()
-        alike = evidence[own].sum() - evidence[own] + 0.5
+        unlike = _OTHER_COLOUR * evidence[has_words & ~of_colour].sum()
+        alike = evidence[has_words & of_colour].sum() - evidence[own] + 0.5
         by_chance = np.maximum((others + unlike + 0.5) / alike, 1) * odd[own]
         as_arcs = others / alike * np.exp(-np.maximum(hypotheses.coded[own], 0)) / _CODED
         left[own] = sure / (1 + (1 - sure) * (by_chance - 1) + sure * as_arcs)

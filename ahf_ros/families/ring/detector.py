@@ -43,7 +43,6 @@ from ahf_ros.families.ring.proposals import (
     with_rims,
 )
 from ahf_ros.families.ring.refinement import refine_centres
-from ahf_ros.families.ring.rivals import has_more
 from ahf_ros.families.undecoded import undecoded
 from ahf_ros.prints.ring import RingPrint
 from ahf_ros.vision import frame
@@ -261,10 +260,8 @@ def read_pyramid(
             codes = further_families(part, rest, left, shown)
             if not codes:
                 break
-            # A family with all words of one that was shown, and more, reads for both.
-            kept = [of for of in shown if not any(has_more(code, of) for code in codes)]
-            if len(kept) < len(shown) or not shown:
-                return again([*kept, *codes])
+            if not shown:
+                return again(codes)
             clear = seen.explained.select(seen.explained.clear)
             dots = dots.select(~clear.on_them(dots.frames, octave.level))
             likely, _ = measure_likely(part, dots, codes)

@@ -143,7 +143,7 @@ def present_families(
     and what it takes to say which of the families of the image it is of. One family is likelier,
     and one whose words follow a rule. A family of more words would hardly show only these.
     """
-    present, sure = _covering(prints), set()
+    present, sure = covering_families(prints), set()
     for code in tuple(present):  # what came first may be needless beside what came later
         fewer = [it for it in present if it is not code]
         if _nats(prints, fewer) < _nats(prints, present):
@@ -163,7 +163,7 @@ def present_families(
     return present, sure
 
 
-def _covering(prints: Sequence[dict[RingPrint, int]]) -> list[RingPrint]:
+def covering_families(prints: Sequence[dict[RingPrint, int]]) -> list[RingPrint]:
     """Return families that have all prints, one by one the best with any others of most words."""
     left: list[dict[RingPrint, int]] = list(prints)
     found = []
