@@ -71,8 +71,9 @@ def _words_shown(
 ) -> list[dict[RingPrint, int]]:
     """Return words of the likeliest print of some dots that has any, by family.
 
-    So many prints are tried at the most, `first` ones before all others, on so many of the
-    likeliest dots; the first print on a sample first, as it is nearly always the right one.
+    So many prints are tried at the most, those of `first` before all others, each on so many of
+    the likeliest dots. The one that is tried first begins with a sample of these, as it is nearly
+    always right.
     """
     prints = list(dict.fromkeys((code.band, code.bits) for code in families))
     mean = bounds(gray, dots, prints)
@@ -93,6 +94,7 @@ def _words_shown(
         if not len(likeliest):
             continue
         alike = _alike(prints, mean[:, likeliest[:_SAMPLE]], best)
+        # What is tried before likelier prints is not read on the dots that these are likely on.
         known += [prints[best]] if prints[best] in first else alike
         same = [code for code in families if _has_any(code, prints[best : best + 1])]
         rivals = [code for code in families if _has_any(code, alike) and code not in same]

@@ -164,7 +164,10 @@ def present_families(
 
 
 def covering_families(prints: Sequence[dict[RingPrint, int]]) -> list[RingPrint]:
-    """Return families that have all prints, one by one the best with any others of most words."""
+    """Return families that have all prints.
+
+    One after the other is the best of what is left, as if others of the most words had the rest.
+    """
     left: list[dict[RingPrint, int]] = list(prints)
     found = []
     while left:
