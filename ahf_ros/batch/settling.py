@@ -11,7 +11,6 @@ from ahf_ros.batch.task import ImageOutcome, ImageTask
 from ahf_ros.families.evidence import Reading
 from ahf_ros.identification.session_settings import IdentificationSettings
 from ahf_ros.identification.settling import FIRST, evident_together
-from ahf_ros.prints.families import AUTO
 
 _LOOK = {'ahf': False, 'expected_targets': 0, 'estimate_expected': False}
 _MOST = 12  # images that are looked at before any is identified
@@ -28,7 +27,7 @@ def settled_tasks(engine: Engine, tasks: Sequence[ImageTask]) -> Sequence[ImageT
     if len(tasks) < 2:
         return tasks
     settings = tasks[0].settings
-    if not AUTO == settings.detection.family == settings.detector:
+    if not settings.settles:
         return tasks
     looks: list[ImageTask] = []
     outcomes: list[ImageOutcome] = []

@@ -178,7 +178,7 @@ class _Seen:
 
         if not self.results:
             return
-        if self.families and AUTO == settings.detection.family == settings.detector:
+        if self.families and settings.settles:
             yield families_line(sorted(self.families))
         if self.doubts and not drawn:
             yield doubtful_remark(self.doubts, self.identified)

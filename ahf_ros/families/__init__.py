@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from ahf_ros.base.options import DetectorOptions
 
 __all__ = [
+    'AUTO',
     'DETECTOR',
     'DETECTOR_NAMES',
     'FAMILY_NAMES',

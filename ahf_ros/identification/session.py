@@ -14,6 +14,7 @@ from ahf_ros.base.settings.nested import updated
 from ahf_ros.base.target import Identification
 from ahf_ros.base.text import shown
 from ahf_ros.families import (
+    AUTO,
     Confirming,
     Contesting,
     Detector,
@@ -31,7 +32,6 @@ from ahf_ros.identification.filtering.trials import DetectorFunction
 from ahf_ros.identification.following import Following
 from ahf_ros.identification.session_settings import IdentificationSettings
 from ahf_ros.identification.settling import SettlingIdentifier
-from ahf_ros.prints.families import AUTO
 from ahf_ros.vision.stack import ImageStack
 
 if TYPE_CHECKING:

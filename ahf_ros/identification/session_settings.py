@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 from ahf_ros.base.settings.parameter import check_parameters, parameter
 from ahf_ros.base.text import counted
-from ahf_ros.families import DETECTOR, DetectorSettings, detector_name, estimator
+from ahf_ros.families import AUTO, DETECTOR, DetectorSettings, detector_name, estimator
 from ahf_ros.identification.filtering.settings import AdaptiveSettings
 from ahf_ros.vision import MAXIMUM_IMAGES
 
@@ -98,6 +98,11 @@ class IdentificationSettings:
     def number(self) -> int:
         """N as it is given, by a number or by IDs; 0 where it is not."""
         return self.expected_targets or len(self.adaptive.wanted)
+
+    @property
+    def settles(self) -> bool:
+        """Whether images show which families are there: neither these nor a detector is named."""
+        return AUTO == self.detection.family == self.detector
 
     def check_detector(self) -> None:
         """Refuse a detector that does not identify the family."""

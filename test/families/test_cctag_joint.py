@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 from ahf_ros.families import create_detector
-from ahf_ros.families.cctag.alignment import Aligned, align
+from ahf_ros.families.cctag.alignment import align
 from ahf_ros.families.cctag.joint import contested, jointly
+from ahf_ros.families.cctag.rings import Aligned
 from ahf_ros.prints.cctag import circle_family
 from ahf_ros.scenes.scene import Rendering
 from ahf_ros.vision import frame

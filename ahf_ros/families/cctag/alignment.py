@@ -3,24 +3,21 @@
 Neighbouring circles are too close for their edges to be measured one by one. So all gray values
 about a centre are fitted, without the light, which is found first. The values of each ray are a
 linear function of the ink of sharp rings under a normal blur.
-
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from ahf_ros.families.cctag.light import Lights, lit
 from ahf_ros.families.cctag.prior import USUAL, Prior
 from ahf_ros.families.cctag.rays import ALONG, PROFILE, RAYS, Rays, Seen
+from ahf_ros.families.cctag.rings import NOTHING, Aligned
 from ahf_ros.families.cctag.templates import MASK, MAXIMUM_SHIFT, rings_along, signed_circles
 from ahf_ros.prints.cctag import CctagPrint
 from ahf_ros.vision import frame
-from ahf_ros.vision.array_record import ArrayRecord
-from ahf_ros.vision.logistic import logistic
 from ahf_ros.vision.normal import normal_integral
 from ahf_ros.vision.robust import medians, quantiles
 
@@ -38,69 +35,10 @@ _HELD = 1e9  # weight of a bound
 _MOST_OF_EDGES = 0.3, 0.3, 1.0  # change of shift, ln of the blur and sharpening in a round
 _CLEAREST = 0.2  # share of rays
 _AGREEING = 0.5  # share of what a ray shows, that the rings explain
-_OF_TARGET = np.array([-14.1, -1.5, 3.0, -1.0, 1.0])  # of one, and of what follows
 _USUAL_EDGES = 0.13, 0.3  # deviations of growth, px, and of ln of the blur, of targets
 _GROWTH_HIDES = 3.0  # ln of odds, at the most growth
 _SHARPENING_HIDES = 0.8  # ln of odds, of an amount of 1
 _CLIPPING_HIDES = 3.0  # ln of odds, where all gray values are clipped
-_PLAIN = -5.0, 5.0  # beyond which it says no more
-_BY_SIZE, _SMALL = 2.5, 12.0  # what `plain` grows by ln of the radius, up to so many px
-_AS_CLEAR = -6.0  # as it gets, by anything that is round
-_OF_ID = np.array([-1.4, 1.2])  # of one, margin
-
-
-@dataclass(frozen=True, slots=True)
-class Aligned(ArrayRecord):
-    """The rings of k IDs as they are brought onto an image."""
-
-    frames: np.ndarray  # (k, 3, 3), of the outermost circles as printed
-    ids: np.ndarray  # int, (k,)
-    covariance: np.ndarray  # (k, 2, 2), of centres, px^2
-    shift: np.ndarray  # (k,), by which ink has grown, px
-    blur: np.ndarray  # (k,), standard deviation, px
-    sharpening: np.ndarray  # (k,), amount of an unsharp mask
-    colour: np.ndarray  # (k,), 1 where ink is dark, -1 where it is bright
-    rays: np.ndarray  # (k,), share of the rays that show the rings by themselves
-    clear: np.ndarray  # (k,), ln of the share of a ray that is not explained, of clear rays
-    left: np.ndarray  # (k,), ln of the share of a ray that is not explained, on the mean
-    plain: np.ndarray  # (k,), the same of any two edges, less that of the rings
-    unusual: np.ndarray  # (k,), half the squares of deviations of edges, that leave a doubt
-    known: np.ndarray  # (k,), share of gray values that are not clipped
-    margin: np.ndarray  # (k,), ln of the odds against the next ID; NaN before it is known
-    by_pixels: np.ndarray  # (k,), ln of the odds that there is a target, by pixels: 0 if not asked
-
-    @property
-    def edges(self) -> np.ndarray:
-        """Shift, blur and sharpening, shape (k, 3)."""
-        return np.stack([self.shift, self.blur, self.sharpening], axis=1)
-
-    @property
-    def edge_shift(self) -> np.ndarray:
-        """By how much what is dark has grown, px, shape (k,)."""
-        return self.shift * self.colour
-
-    @property
-    def of_target(self) -> np.ndarray:
-        """Probability that there is a target, shape (k,)."""
-        small = np.minimum(frame.mean_radii(self.frames) / _SMALL, 1)
-        plain = np.clip(self.plain - _BY_SIZE * np.log(small), *_PLAIN)
-        features = [np.maximum(self.clear, _AS_CLEAR), plain, self.unusual, self.by_pixels]
-        return logistic(np.stack(features, axis=1), _OF_TARGET)
-
-    @property
-    def of_id(self) -> np.ndarray:
-        """Probability that a target has the ID, shape (k,)."""
-        return logistic(self.margin[:, None], _OF_ID)
-
-    @property
-    def confidence(self) -> np.ndarray:
-        """Probability that there is a target with the ID, shape (k,)."""
-        return self.of_target * self.of_id
-
-
-NOTHING = Aligned(
-    *(np.zeros((0, 3, 3)), np.zeros(0, int), np.zeros((0, 2, 2)), *np.zeros((12, 0)))
-)
 
 
 def align(

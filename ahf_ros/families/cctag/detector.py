@@ -17,13 +17,14 @@ import numpy as np
 
 from ahf_ros.base.blas import one_blas_thread
 from ahf_ros.base.target import UNDECODED, Target, sorted_targets
-from ahf_ros.families.cctag.alignment import Aligned, align
+from ahf_ros.families.cctag.alignment import align
 from ahf_ros.families.cctag.glance import LARGEST, Circles, likely_rings
 from ahf_ros.families.cctag.joint import contested, jointly
 from ahf_ros.families.cctag.light import EDGES, Lights, shares_alike
 from ahf_ros.families.cctag.prior import Prior
 from ahf_ros.families.cctag.rays import is_drawing, of_drawing
 from ahf_ros.families.cctag.reading import identify, in_light, likely_lights, show_the_same
+from ahf_ros.families.cctag.rings import Aligned
 from ahf_ros.families.claims import owners
 from ahf_ros.families.contract import moved_targets
 from ahf_ros.families.pyramid_detector import PyramidDetector

@@ -14,13 +14,14 @@ from operator import itemgetter
 
 import numpy as np
 
-from ahf_ros.families.cctag.alignment import Aligned, align
+from ahf_ros.families.cctag.alignment import align
 from ahf_ros.families.cctag.fit import Fit, Usual, fitted
 from ahf_ros.families.cctag.light import EDGES, Lights
 from ahf_ros.families.cctag.likely_ids import likely_ids
 from ahf_ros.families.cctag.patch import Patch
 from ahf_ros.families.cctag.prior import Prior
 from ahf_ros.families.cctag.rays import FEW_RAYS
+from ahf_ros.families.cctag.rings import Aligned
 from ahf_ros.families.cctag.templates import MAXIMUM_SHIFT, signed_circles
 from ahf_ros.prints import CCTAG_NAMES
 from ahf_ros.prints.cctag import CctagPrint, circle_family

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from ahf_ros.families.cctag.light import Lights, lit
 from ahf_ros.families.cctag.prior import Prior
 from ahf_ros.families.cctag.rays import PROFILE, RAYS
+from ahf_ros.families.cctag.rings import Likely
 from ahf_ros.families.cctag.templates import (
     by_value,
     less_lines,
@@ -19,7 +18,6 @@ from ahf_ros.families.cctag.templates import (
 )
 from ahf_ros.prints.cctag import CctagPrint
 from ahf_ros.vision import frame
-from ahf_ros.vision.array_record import ArrayRecord
 
 _SCALES = np.linspace(0.93, 1.07, 9)  # of the radius, about a frame
 _WIDE = np.linspace(PROFILE[0] * _SCALES[0], PROFILE[-1] * _SCALES[-1], 80)
@@ -32,42 +30,6 @@ _PART = 48  # targets at a time, which bounds the memory
 _ALIKE = 0.9  # share of the mean of rays, that some ID explains
 _LIKE_DISCS = 12.0  # px: two discs leave less than rings of so many px, by a factor of e at most
 _READINGS = 5  # IDs that are brought onto the image from a frame
-
-
-@dataclass(frozen=True, slots=True)
-class Likely(ArrayRecord):
-    """The n likeliest IDs of k targets, by their mean profiles."""
-
-    starts: np.ndarray  # (k, n, 3, 3), frames
-    ids: np.ndarray  # int, (k, n)
-    edges: np.ndarray  # (k, n, 3): growth of ink and blur, px, and sharpening
-    shares: np.ndarray  # (k, n), of the mean profile that rings with the ID explain
-    rings: np.ndarray  # bool, (k,), whether there may be rings of any ID
-
-    @property
-    def first(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Frames, IDs and edges of the likeliest IDs, k rows each."""
-        return self.starts[:, 0], self.ids[:, 0], self.edges[:, 0]
-
-    @property
-    def repeated(self) -> np.ndarray:
-        """Return which IDs are in their row before, (k, n)."""
-        same = self.ids[:, :, None] == self.ids[:, None]
-        return np.asarray(same.argmax(axis=2) != np.arange(self.ids.shape[1]))
-
-    def at(self, rows: np.ndarray, columns: np.ndarray) -> tuple[np.ndarray, ...]:
-        """Return frames, IDs and edges of some IDs of targets."""
-        return self.starts[rows, columns], self.ids[rows, columns], self.edges[rows, columns]
-
-    def beside(self, others: Likely) -> Likely:
-        """Return the IDs followed by others of the same targets."""
-        return Likely(
-            starts=np.concatenate([self.starts, others.starts], axis=1),
-            ids=np.concatenate([self.ids, others.ids], axis=1),
-            edges=np.concatenate([self.edges, others.edges], axis=1),
-            shares=np.concatenate([self.shares, others.shares], axis=1),
-            rings=self.rings,
-        )
 
 
 def likely_ids(

@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 
 from ahf_ros import kernels
-from ahf_ros.families.cctag.alignment import Aligned
 from ahf_ros.families.cctag.light import Lights, usual_widths
 from ahf_ros.families.cctag.rays import clipped
+from ahf_ros.families.cctag.rings import Aligned
 from ahf_ros.families.cctag.templates import MASK
 from ahf_ros.vision import frame
 

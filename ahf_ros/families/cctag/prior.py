@@ -6,19 +6,14 @@ import math
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import product
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ahf_ros.families.cctag.rays import PROFILE
+from ahf_ros.families.cctag.rings import Aligned, Likely
 from ahf_ros.families.cctag.templates import CLIPPED, Edge
 from ahf_ros.families.words import against
 from ahf_ros.vision.robust import NORMAL
-
-if TYPE_CHECKING:
-    from ahf_ros.families.cctag.alignment import Aligned
-    from ahf_ros.families.cctag.likely_ids import Likely
-
 
 _TRIED_SHIFTS = -1.2, -0.6, 0.0, 0.6, 1.2  # deviations
 _TRIED_BLURS, _TRIED_SHARPENINGS = (-1.0, 0.0, 1.4), (3.0, 7.0)  # the same

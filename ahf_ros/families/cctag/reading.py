@@ -6,11 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from ahf_ros.families.cctag.alignment import NOTHING, Aligned, align
+from ahf_ros.families.cctag.alignment import align
 from ahf_ros.families.cctag.light import EDGES, Lights, lit
-from ahf_ros.families.cctag.likely_ids import Likely, likely_ids
+from ahf_ros.families.cctag.likely_ids import likely_ids
 from ahf_ros.families.cctag.prior import USUAL, Prior
 from ahf_ros.families.cctag.rays import FEW_RAYS
+from ahf_ros.families.cctag.rings import NOTHING, Aligned, Likely
 from ahf_ros.families.cctag.templates import less_lines
 from ahf_ros.prints.cctag import CctagPrint
 from ahf_ros.vision import frame
