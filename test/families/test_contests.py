@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from ahf_ros.families.ring.confidence import rated
-from ahf_ros.families.ring.contests import resolve
+from ahf_ros.families.ring.contests import among_others, resolve
 from ahf_ros.families.ring.decoding import Words
 from ahf_ros.families.ring.hypotheses import Hypotheses
 from ahf_ros.prints.ring import family
@@ -104,6 +104,40 @@ def test_of_two_targets_whose_bands_overlap_only_the_surer_one_is_certain(
     places = [50, 50 + apart]
     assert resolved(places, [90, 80], [1, 2], confidence)[1] == on_top
     assert resolved(places, [90, 80], [1, 2], [True, False])[1] == [True, False]
+
+
+def certain_among(words: list[int], foreign: list[int], confidence: Any = 0.93) -> int:
+    """Return how many readings of words stay certain beside bands of no word."""
+    count, every = len(words), [*words, *foreign]
+    found = hypotheses([80 * it for it in range(len(every))], [50] * len(every))
+    is_word = np.arange(len(every)) < count
+    found = replace(
+        found,
+        words=CODE.words[every],
+        confidence=np.append(np.broadcast_to(confidence, count), np.zeros(len(foreign))),
+        coded=np.where(is_word, 5.0, -15.0),
+    )
+    return int(among_others(found).certain.sum())
+
+
+def test_spots_of_a_lattice_are_no_other_family_however_many_there_are() -> None:
+    """Their neighbours are all where those of the next spot are."""
+    targets, spots = list(range(14)), [20, 21, 22] * 30
+    assert certain_among(targets, spots) == 14
+    assert certain_among(targets, list(range(14, 104))) == 0
+
+
+def test_words_lose_what_others_lose_and_no_more() -> None:
+    """As measured under fringes, whose bands took the surest, too, once the others were gone."""
+    confidence = [0.83, 0.87, 0.89, 0.88, 0.92, 0.93, 0.85, 0.87, 0.75, 0.91]
+    assert certain_among(list(range(10)), list(range(20, 34)), confidence) == 7
+    assert certain_among(list(range(10)), list(range(20, 100)), confidence) == 0
+
+
+def test_one_word_in_several_places_does_not_speak_for_itself() -> None:
+    """As a letter of a page does."""
+    assert certain_among([1, 2, 3, 4], list(range(20, 26))) == 4
+    assert certain_among([1, 1, 1, 1], list(range(20, 26))) == 0
 
 
 def test_parts_of_finds_stay_in_order() -> None:

@@ -10,6 +10,7 @@ import numpy as np
 from ahf_ros.families.claims import Rivals, leading, owners, sole_owners, surer, within
 from ahf_ros.families.ring.confidence import COVERED
 from ahf_ros.families.ring.decoding import CLEAR
+from ahf_ros.families.ring.families import decoded
 from ahf_ros.families.ring.hypotheses import Hypotheses
 from ahf_ros.families.ring.rivals import has_all
 from ahf_ros.vision import frame
@@ -19,6 +20,7 @@ _CLEARLY = 2.0  # times the evidence of another claim to the same dot
 _FOREIGN = 10.0  # log odds of arcs of any length against a word, which is none then
 _OTHER_COLOUR = 0.2  # of a foreign band, that a target of the other colour counts for
 _ROUND = 0.6  # share of the edges of a word that are in their place, where there is a band
+_SETTLED = 1e-3  # change of a confidence by that of others
 _CODED = 5.0  # odds of words against arcs of any length, before any is read
 _OVERLAP = 0.92  # of the radii of two targets, at which the paper of one hides marks of the other
 _SHEAR = 0.5  # ln of axes, by which a shape differs from those of all targets beside it
@@ -31,44 +33,55 @@ def among_others(hypotheses: Hypotheses) -> Hypotheses:
     Targets of one image share a family. Whole bands that arcs of any length explain better than
     words, and targets that do not look like their print are foreign. Among these a word is one by
     chance, unless more targets share its family and its colour, which most targets of an image do,
-    also by words of a family of which its own has all;
-    and it is arcs of any length, unless it explains its band better. What is not certain among
-    these speaks for no other word of its family. Targets that are close to each other have much
-    the same shape, which a word that is one by chance has not.
+    also by words of a family of which its own has all; and it is arcs of any length, unless it
+    explains its band better. What is read in several places, as in spots of light or letters,
+    counts once. What is certain by itself speaks for other words as far as it is certain among
+    these. Targets that are close to each other have much the same shape, which a word that is one
+    by chance has not.
     """
     arcs = (hypotheses.coded < -_FOREIGN) & (hypotheses.share > _ROUND)
     arcs |= hypotheses.unlike > COVERED
     odd = np.where(_odd(hypotheses), _ODD, 1.0)
-    left = hypotheses
+    codes, left = decoded(hypotheses)[1], hypotheses
     while True:
-        confidence = _among(hypotheses, left, arcs & ~left.certain, odd)
-        among = replace(hypotheses, confidence=confidence)
-        if np.array_equal(among.certain, left.certain):
-            return among
-        left = among
+        confidence = _among(hypotheses, codes, left.confidence, arcs & ~left.certain, odd)
+        if (left.confidence - confidence).max(initial=0.0) < _SETTLED:
+            return replace(hypotheses, confidence=confidence)
+        left = replace(hypotheses, confidence=confidence)
 
 
 def _among(
-    hypotheses: Hypotheses, likely: Hypotheses, foreign: np.ndarray, odd: np.ndarray
+    hypotheses: Hypotheses,
+    codes: np.ndarray,
+    likely: np.ndarray,
+    foreign: np.ndarray,
+    odd: np.ndarray,
 ) -> np.ndarray:
     """Return the confidence of hypotheses, by how likely each is and by foreign bands, (k,).
 
-    `odd`, shape (k,), are the odds against their shapes.
+    `codes`, shape (k,), are canonical code words, and `odd` the odds against the shapes.
     """
     left = hypotheses.confidence.copy()
-    evidence = likely.certain * likely.confidence
+    evidence = hypotheses.certain * likely
     families = list(dict.fromkeys(hypotheses.families))
     for code, sign in product(families, (1, -1)):
         of_family, of_colour = hypotheses.families == code, hypotheses.polarity == sign
         has_words = np.isin(hypotheses.families, [it for it in families if has_all(code, it)])
         own = of_family & of_colour
-        sure, others = hypotheses.confidence[own], foreign[own].sum()
+        sure, others = hypotheses.confidence[own], len(np.unique(codes[own & foreign]))
         unlike = _OTHER_COLOUR * evidence[has_words & ~of_colour].sum()
-        alike = evidence[has_words & of_colour].sum() - evidence[own] + 0.5
+        alike = _of_other_words(codes, evidence * (has_words & of_colour))[own] + 0.5
         by_chance = np.maximum((others + unlike + 0.5) / alike, 1) * odd[own]
         as_arcs = others / alike * np.exp(-np.maximum(hypotheses.coded[own], 0)) / _CODED
         left[own] = sure / (1 + (1 - sure) * (by_chance - 1) + sure * as_arcs)
     return left
+
+
+def _of_other_words(codes: np.ndarray, evidence: np.ndarray) -> np.ndarray:
+    """Return the evidence of all words but that of each, which is the best of a word, (k,)."""
+    best, which = np.zeros(len(codes)), np.unique(codes, return_inverse=True)[1]
+    np.maximum.at(best, which, evidence)
+    return best.sum() - best[which]
 
 
 def _odd(hypotheses: Hypotheses) -> np.ndarray:
