@@ -5,16 +5,18 @@ each picture, the IDs of its targets and where they are, as a person reads them 
 in others of its series. `uncounted` are targets that nobody is asked for: too small for a person,
 cut by the border, or of an ID that two of one colour share. Families that the package does not
 have were learnt from the photographs by `ahf learn-family`, and lie beside. Each picture is read
-from a clone of its repository, and identified by itself, with its family named and with `auto`:
+from a clone of its repository, and identified by itself, with its family named and with `auto`, as
+it is or under patterns of light:
 
     git clone https://github.com/poxiao2/CCTDecode FOLDER/poxiao2/CCTDecode
     python -m benchmarks.photographs FOLDER [--repositories poxiao2/CCTDecode ...]
-        [--families named auto] [--output FILE]
+        [--families named auto] [--lights stripe lattice --ambient 0.3 0.12] [--output FILE]
 """
 
 import argparse
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +26,9 @@ from ahf_ros import FAMILY_NAMES, identify
 from ahf_ros.base.target import Target
 from ahf_ros.prints.families import AUTO
 from ahf_ros.scenes.evaluation import RIGHT, judge, score
+from ahf_ros.scenes.patterns import LIGHT_NAMES
 from benchmarks import report
+from support.pictures.projected import lit
 from support.strangers import TRUTH, Photograph, photographs, picture, targets_of
 
 NAMED = 'named'
@@ -44,7 +48,9 @@ def ways_of(shown: Photograph, ways: Sequence[str]) -> list[str]:
     return [way for way in ways if way == NAMED or shown['family'] in FAMILY_NAMES]
 
 
-def record(image: np.ndarray, shown: Photograph, ways: Sequence[str]) -> dict[str, Any]:
+def record(
+    image: np.ndarray, shown: Photograph, ways: Sequence[str], light: str = ''
+) -> dict[str, Any]:
     """Return the figures of a photograph, and the IDs that were missed, by ways."""
     truth, figures = targets_of(shown), {}
     for way in ways_of(shown, ways):
@@ -57,7 +63,7 @@ def record(image: np.ndarray, shown: Photograph, ways: Sequence[str]) -> dict[st
             'false': of.false_positives,
             'missed': [it.id for it in truth if it.confirmed and it not in right],
         }
-    named = {key: shown[key] for key in ('repository', 'path', 'family')}
+    named = {key: shown[key] for key in ('repository', 'path', 'family')} | {'light': light}
     return named | {'expected': len(shown['targets']), 'by': figures}
 
 
@@ -66,12 +72,16 @@ def markdown(figures: report.Report) -> str:
     ways, rows = figures['ways'], []
     for of in figures['rows']:
         where = f'[{of["repository"]}](https://github.com/{of["repository"]}) `{of["path"]}`'
+        where += f' {of["light"]}' * bool(of['light'])
         counts = [cell for way in ways for cell in _cells(of['by'].get(way))]
         rows.append((where, of['family'], of['expected'], *counts))
     head = [name for way in ways for name in (way, 'wrong', 'false', 'missed')]
-    sums = [_total(figures['rows'], way) for way in ways]
     table = report.table(('picture', 'family', 'N', *head), rows)
-    return '\n'.join([report.machine_text(figures['machine']), '', *table, '', *sums])
+    parts = [report.machine_text(figures['machine']), '', *table, '']
+    for light in dict.fromkeys(of['light'] for of in figures['rows']):
+        some = [of for of in figures['rows'] if of['light'] == light]
+        parts += [f'{light}: ' * bool(light) + _total(some, way) for way in ways]
+    return '\n'.join(parts)
 
 
 def _cells(of: dict[str, Any] | None) -> tuple[object, ...]:
@@ -98,12 +108,25 @@ def measure(options: argparse.Namespace) -> report.Report:
     some = [shown for shown in photographs() if shown['repository'] in options.repositories]
     try:
         rows = [
-            record(picture(options.folder, shown), shown, options.families)
+            record(image, shown, options.families, light)
             for shown in report.progress(some, 'photographs')
+            for light, image in _views(picture(options.folder, shown), shown, options)
         ]
     except ValueError as error:
         raise report.Unacceptable(error) from error
     return {'ways': list(options.families), 'rows': rows}
+
+
+def _views(
+    image: np.ndarray, shown: Photograph, options: argparse.Namespace
+) -> Iterator[tuple[str, np.ndarray]]:
+    """Yield a photograph under each light that is asked for, or as it is."""
+    if not options.lights:
+        yield '', image
+    elif seen := identified(image, shown['family']):
+        radius = float(np.median([it.semi_major for it in seen]))
+        for light, ambient in product(options.lights, options.ambient):
+            yield f'{light} {ambient}', lit(image, light, ambient, radius, options.seed)
 
 
 def parser() -> argparse.ArgumentParser:
@@ -113,6 +136,9 @@ def parser() -> argparse.ArgumentParser:
     made.add_argument('folder', type=Path, help='with the clones, as owner/name')
     made.add_argument('--repositories', nargs='+', choices=known, default=known)
     made.add_argument('--families', nargs='+', choices=WAYS, default=WAYS)
+    made.add_argument('--lights', nargs='+', choices=LIGHT_NAMES, default=[])
+    made.add_argument('--ambient', nargs='+', type=float, default=[0.3, 0.12])
+    made.add_argument('--seed', type=int, default=report.FIRST_TEST_SEED, help='of the lights')
     return made
 
 

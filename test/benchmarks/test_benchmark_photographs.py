@@ -11,6 +11,7 @@ from ahf_ros import FAMILY_NAMES, SceneSettings, render
 from ahf_ros.prints.families import print_in
 from benchmarks import photographs
 from support import strangers
+from support.pictures.projected import lit
 
 
 def test_the_truth_names_pictures_and_families_that_can_be_read() -> None:
@@ -55,6 +56,21 @@ def test_a_picture_is_read_from_its_clone_and_scored(clone: tuple[Path, dict[str
     moved = {**shown, 'targets': [[shown['targets'][0][0], 5, 5]], 'uncounted': []}
     by = photographs.record(image, moved, ['named'])['by']['named']
     assert (by['right'], by['false'], by['missed']) == (0, 3, [moved['targets'][0][0]])
+
+
+def test_a_picture_is_lit_by_a_pattern(
+    clone: tuple[Path, dict[str, Any]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder, shown = clone
+    monkeypatch.setattr(photographs, 'photographs', lambda: [shown])
+    given = [str(folder), '--lights', 'lattice', '--ambient', '0.3', '0.1', '--families', 'named']
+    figures = photographs.measure(photographs.parser().parse_args(given))
+    assert [of['light'] for of in figures['rows']] == ['lattice 0.3', 'lattice 0.1']
+    assert [of['by']['named']['right'] for of in figures['rows']] == [2, 2]
+    image = strangers.picture(folder, shown)
+    dim, dimmer = (lit(image, 'lattice', of, 9.0, 101) for of in (0.3, 0.1))
+    assert image.mean() > dim.mean() > dimmer.mean() > 0
+    assert (dim == lit(image, 'lattice', 0.3, 9.0, 101)).all()
 
 
 def test_a_picture_that_is_not_there_says_what_to_clone(
