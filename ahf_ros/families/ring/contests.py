@@ -20,7 +20,7 @@ _CLEARLY = 2.0  # times the evidence of another claim to the same dot
 _FOREIGN = 10.0  # log odds of arcs of any length against a word, which is none then
 _OTHER_COLOUR = 0.2  # of a foreign band, that a target of the other colour counts for
 _ROUND = 0.6  # share of the edges of a word that are in their place, where there is a band
-_SETTLED = 1e-3  # change of a confidence by that of others
+_BY_CHANCE = 3  # places in which foreign bands may show one word by chance
 _CODED = 5.0  # odds of words against arcs of any length, before any is read
 _OVERLAP = 0.92  # of the radii of two targets, at which the paper of one hides marks of the other
 _SHEAR = 0.5  # ln of axes, by which a shape differs from those of all targets beside it
@@ -34,26 +34,29 @@ def among_others(hypotheses: Hypotheses) -> Hypotheses:
     words, and targets that do not look like their print are foreign. Among these a word is one by
     chance, unless more targets share its family and its colour, which most targets of an image do,
     also by words of a family of which its own has all; and it is arcs of any length, unless it
-    explains its band better. What is read in several places, as in spots of light or letters,
-    counts once. What is certain by itself speaks for other words as far as it is certain among
-    these. Targets that are close to each other have much the same shape, which a word that is one
+    explains its band better. What is not certain among these speaks for no other word of its
+    family. Targets that are close to each other have much the same shape, which a word that is one
     by chance has not.
+
+    What has one word in many places is no print, but light or letters that repeat themselves: a
+    word speaks for others once, and against them as often as chance might read it.
     """
     arcs = (hypotheses.coded < -_FOREIGN) & (hypotheses.share > _ROUND)
     arcs |= hypotheses.unlike > COVERED
     odd = np.where(_odd(hypotheses), _ODD, 1.0)
     codes, left = decoded(hypotheses)[1], hypotheses
     while True:
-        confidence = _among(hypotheses, codes, left.confidence, arcs & ~left.certain, odd)
-        if (left.confidence - confidence).max(initial=0.0) < _SETTLED:
-            return replace(hypotheses, confidence=confidence)
-        left = replace(hypotheses, confidence=confidence)
+        confidence = _among(hypotheses, codes, left, arcs & ~left.certain, odd)
+        among = replace(hypotheses, confidence=confidence)
+        if np.array_equal(among.certain, left.certain):
+            return among
+        left = among
 
 
 def _among(
     hypotheses: Hypotheses,
     codes: np.ndarray,
-    likely: np.ndarray,
+    likely: Hypotheses,
     foreign: np.ndarray,
     odd: np.ndarray,
 ) -> np.ndarray:
@@ -62,13 +65,15 @@ def _among(
     `codes`, shape (k,), are canonical code words, and `odd` the odds against the shapes.
     """
     left = hypotheses.confidence.copy()
-    evidence = hypotheses.certain * likely
+    evidence = likely.certain * likely.confidence
     families = list(dict.fromkeys(hypotheses.families))
     for code, sign in product(families, (1, -1)):
         of_family, of_colour = hypotheses.families == code, hypotheses.polarity == sign
         has_words = np.isin(hypotheses.families, [it for it in families if has_all(code, it)])
         own = of_family & of_colour
-        sure, others = hypotheses.confidence[own], len(np.unique(codes[own & foreign]))
+        sure = hypotheses.confidence[own]
+        _, places = np.unique(codes[own & foreign], return_counts=True)
+        others = np.minimum(places, _BY_CHANCE).sum()
         unlike = _OTHER_COLOUR * evidence[has_words & ~of_colour].sum()
         alike = _of_other_words(codes, evidence * (has_words & of_colour))[own] + 0.5
         by_chance = np.maximum((others + unlike + 0.5) / alike, 1) * odd[own]
