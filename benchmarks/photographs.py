@@ -120,7 +120,10 @@ def measure(options: argparse.Namespace) -> report.Report:
 def _views(
     image: np.ndarray, shown: Photograph, options: argparse.Namespace
 ) -> Iterator[tuple[str, np.ndarray]]:
-    """Yield a photograph under each light that is asked for, or as it is."""
+    """Yield a photograph under each light that is asked for, or as it is.
+
+    Patterns are as large beside its dots as in scenes; one without targets has none.
+    """
     if not options.lights:
         yield '', image
     elif seen := identified(image, shown['family']):

@@ -9,7 +9,11 @@ import numpy as np
 Pattern = Callable[[np.ndarray, np.ndarray], np.ndarray]
 """From projector pixels (u, v), float32 of one shape, to the brightness there, 0 to 1."""
 
-_HALF_VIEW = (640.0, 400.0)  # half the size of a 1280 x 800 projector, px
+HALF_VIEW = (640.0, 400.0)
+"""Half the size of a 1280 x 800 projector, px."""
+
+PROJECTOR_PIXELS = 6.4
+"""Per radius of a dot: 1280 across an image of 200 radii, as scenes are by default."""
 
 
 def uniform(_generator: np.random.Generator, _defocus: float, _shift: float) -> Pattern:
@@ -75,7 +79,7 @@ def lattice(
 
 def spots(generator: np.random.Generator, defocus: float, _shift: float) -> Pattern:
     """Return three large bright spots with soft edges in the dark."""
-    half_width, half_height = _HALF_VIEW
+    half_width, half_height = HALF_VIEW
     u_centres = (np.array([-0.6, 0.0, 0.6]) + generator.uniform(-0.12, 0.12, 3)) * half_width
     v_centres = generator.uniform(-0.5, 0.5, 3) * half_height
     radii = generator.uniform(170, 240, 3)
@@ -193,7 +197,7 @@ def _bar(generator: np.random.Generator) -> list[tuple[np.float32, np.float32, n
 
 def _polygon(generator: np.random.Generator) -> list[tuple[np.float32, np.float32, np.float32]]:
     """Return the sides of a convex polygon around a random point of the view."""
-    place = generator.uniform(-1, 1, 2) * _HALF_VIEW
+    place = generator.uniform(-1, 1, 2) * HALF_VIEW
     corners = int(generator.integers(3, 7))
     turn = generator.uniform(0, 2 * math.pi)
     steps = (np.arange(corners) + generator.uniform(-0.2, 0.2, corners)) / corners

@@ -24,14 +24,13 @@ from ahf_ros.scenes.layout import (
     scattered_placements,
     size_ratios,
 )
-from ahf_ros.scenes.patterns import LIGHT_NAMES, light_pattern, turned
+from ahf_ros.scenes.patterns import LIGHT_NAMES, PROJECTOR_PIXELS, light_pattern, turned
 from ahf_ros.scenes.prints import Mark, mark_at, print_mark
 from ahf_ros.scenes.radiance import paper_texture, rig_projector, wall_radiance
 
 _CARD_WIDTH = math.cos(math.pi / 8)  # of eight sides, as a share of the distance of its corners
 _MAXIMUM_SHIFT = 0.35  # of edges, in dot radii: nearly half a sector of the finest ring codes
 
-_PROJECTOR_PIXELS = 6.4  # per radius of a dot: 1280 across an image of 200 radii, as by default
 _PIXEL_DEVIATION = 12**-0.5  # standard deviation of a position inside a pixel, px
 _STRIP = 128  # rows exposed at a time, to bound the memory
 
@@ -309,7 +308,7 @@ def render(settings: SceneSettings, phase: int = 0) -> Rendering:
         settings.distortion,
         setup,
     )
-    projector_pixel = settings.dot_radius / _PROJECTOR_PIXELS
+    projector_pixel = settings.dot_radius / PROJECTOR_PIXELS
     projector = rig_projector(camera.pose, projector_pixel, setup)
     cards, marks, targets, placements = _coded_targets(settings, camera, wall)
     distractors = _distractors(settings, camera, placements, clutter)
