@@ -8,7 +8,6 @@ from collections.abc import Iterable
 
 from ahf_ros.base.target import UNDECODED, Target, UndecodedTarget
 
-_DOUBTFUL = 0.9  # confidence up to which words are read in nearly any texture
 _CERTAIN = 1e-3  # probability that a target is wrong, below which it counts for no more
 _CLEAR = 6.0  # decimal logarithm of the odds on a family that is there beyond doubt
 
@@ -31,8 +30,7 @@ def evidence(readings: Iterable[Reading]) -> dict[str, list[float]]:
             surest[family, number] = max(surest[family, number], confidence)
     by_family: defaultdict[str, list[float]] = defaultdict(list)
     for (family, _), confidence in surest.items():
-        if confidence > _DOUBTFUL:
-            by_family[family].append(-math.log10(max(1 - confidence, _CERTAIN)))
+        by_family[family].append(-math.log10(max(1 - confidence, _CERTAIN)))
     return by_family
 
 

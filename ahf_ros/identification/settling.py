@@ -34,7 +34,7 @@ FIRST = 3
 """Images with targets in which all families are looked for, unless one makes it clear."""
 
 _OF_ONE = 2.0  # decimal logarithm of the odds on a family: one target certain to 0.99
-_OF_SEVERAL = 3.6  # ... of all together: three certain to 0.94, or two to 0.984
+_OF_SEVERAL = 3.6  # ... of all together: six certain to 0.75, three to 0.94, or two to 0.984
 _WORTH_A_LOOK = 1.3  # ... on another family in a part of an image: one certain to 0.95
 _PER_IMAGE = 0.3  # words that texture shows by chance in an image, at the most
 _OF_KNOWN = 1.99  # ... on families that other images have settled: one certain to 0.99
@@ -55,9 +55,9 @@ def memory_of(families: Sequence[str]) -> Memory:
 def evident(targets: Sequence[Target]) -> list[Target]:
     """Return the targets of families that they are evidence for, and undecoded ones.
 
-    Where all families are looked for, words of some are read in nearly any texture. Most are
-    doubtful, which is no evidence, and the others are few of one family: one that is certain is
-    evidence, or three to 0.94. What is read in several places, as letters may be, counts once.
+    Where all families are looked for, words of some are read in nearly any texture, but few of one
+    family: one that is certain is evidence, or three to 0.94, or six to 0.75. What is read in
+    several places, as letters may be, counts once.
     """
     shown = {
         family

@@ -10,13 +10,19 @@ from ahf_ros.families.ring import detector, proposals
 from ahf_ros.families.ring.detector import find_hypotheses, report
 from ahf_ros.families.ring.families import read_families
 from ahf_ros.families.ring.hypotheses import Hypotheses
-from ahf_ros.families.ring.proposals import HOPEFUL, hopes, measure_alike, with_rims
+from ahf_ros.families.ring.proposals import (
+    HOPEFUL,
+    hopes,
+    measure_alike,
+    most_hopeful,
+    with_rims,
+)
 from ahf_ros.prints.ring import family
 from ahf_ros.scenes.scene import SceneSettings, render
 from ahf_ros.vision import frame
 from ahf_ros.vision.circle_fit import Fit
 from ahf_ros.vision.dots import Dots
-from support.ring import lone_dot, measured
+from support.ring import lone_dot, made_up, measured
 
 SMALL = SceneSettings(width=800, height=600, targets=4)
 FAMILIES = [family(name) for name in ('aicon14', 'metashape12')]
@@ -45,6 +51,17 @@ def test_a_dot_without_a_band_is_not_worth_reading(ink: int, paper: int, x: floa
     gray = lone_dot(ink, paper, x)
     alone = measured(gray, [x], [100.0], 12.0, 1 if ink < paper else -1, rounds=1)
     assert not (hopes(gray, alone, FAMILIES) > HOPEFUL).any()
+
+
+def test_dots_come_by_their_bands_and_by_how_clear_they_are() -> None:
+    """Spots of light have higher bands than small targets, but broken and pale edges."""
+    dots = replace(
+        made_up([10, 30, 50, 70]),
+        share=np.array([0.7, 0.95, 0.95, 0.6]),
+        contrast=np.array([0.6, 0.2, 0.2, 0.5]),
+    )
+    hope = np.array([1.3, 0.7, 0.9, 1.0])
+    assert most_hopeful(dots, hope).tolist() == [2, 1, 0, 3]
 
 
 @pytest.mark.parametrize(

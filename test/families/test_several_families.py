@@ -13,7 +13,7 @@ from ahf_ros.base.target import UNDECODED, Target
 from ahf_ros.families import DetectorSettings, create_detector, estimator
 from ahf_ros.families.ring.choice import choose_families, further_families
 from ahf_ros.prints import RING_NAMES
-from ahf_ros.prints.ring import family
+from ahf_ros.prints.ring import family, words_of_prints
 from ahf_ros.scenes.covers import Cover, ink_cover
 from ahf_ros.scenes.scene import Rendering, SceneSettings
 from support.pictures.exposure import Exposure
@@ -178,6 +178,17 @@ def test_targets_of_a_small_family_are_not_those_of_a_larger_one_with_the_same_p
     shown = scene('cct12')
     truth = [(it.family, it.id, it.x, it.y) for it in shown.targets]
     assert matches(identified(shown.image, family='cct12,aicon12'), truth)
+
+
+def test_one_word_of_a_larger_family_does_not_take_the_prints_of_a_smaller_one() -> None:
+    """Sixteen sectors have all prints of eight, each sector twice."""
+    eight, sixteen = family('cct8'), family('cct16')
+    words = eight.words[[3, 8, 13, 18, 23]]
+    prints = {of[sixteen] for of in words_of_prints(eight, words, [sixteen])}
+    odd = next(it for it in sixteen.words[1000:].tolist() if it not in prints)
+    marks = [('cct8', int(word)) for word in words]
+    found = identified(sheet(*marks, ('cct16', odd)), family='cct8,cct16')
+    assert sorted((it.family, it.code) for it in found) == sorted([*marks, ('cct16', odd)])
 
 
 @pytest.mark.parametrize(('rule', 'free'), [('aicon12', 'cct12'), ('aicon14', 'cct14')])

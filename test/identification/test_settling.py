@@ -42,9 +42,16 @@ def target(number: int, confidence: float, family: str = 'cct12') -> Target:
 
 @pytest.mark.parametrize(
     ('confidences', 'shown'),
-    [((0.989,), False), ((0.991,), True), ((0.98, 0.98), False), ((0.986, 0.986), True)],
+    [
+        ((0.989,), False),
+        ((0.991,), True),
+        ((0.98, 0.98), False),
+        ((0.986, 0.986), True),
+        ((0.76,) * 5, False),
+        ((0.76,) * 6, True),
+    ],
 )
-def test_two_targets_need_less_each_than_one(confidences: tuple[float, ...], shown: bool) -> None:
+def test_several_need_less_each_than_one(confidences: tuple[float, ...], shown: bool) -> None:
     targets = [target(number, it) for number, it in enumerate(confidences, start=1)]
     assert evident(targets) == (targets if shown else [])
 

@@ -14,7 +14,7 @@ import numpy as np
 from ahf_ros.families.ring.decoding import DOUBT
 from ahf_ros.families.ring.families import covering_families, words_shown
 from ahf_ros.families.ring.hypotheses import Hypotheses
-from ahf_ros.families.ring.proposals import HOPEFUL, Print, bounds, measure_likely
+from ahf_ros.families.ring.proposals import HOPEFUL, Print, bounds, measure_likely, most_hopeful
 from ahf_ros.families.ring.reading import read_bands
 from ahf_ros.families.ring.rivals import has_more, odds
 from ahf_ros.prints.ring import RingPrint
@@ -56,7 +56,8 @@ def further_families(
         return []
     finest = {code.band: code.bits for code in sorted(families, key=lambda code: code.bits)}
     mean = bounds(gray, dots, list(finest.items()), _ROUGH).max(axis=0)
-    order = np.argsort(-mean, kind='stable')[: np.count_nonzero(mean > _CLEAR)][:_CLEAREST]
+    order = most_hopeful(dots, mean)
+    order = order[mean[order] > _CLEAR][:_CLEAREST]
     first = [(code.band, code.bits) for code in shown]
     return covering_families(_words_shown(gray, dots.select(order), families, first))
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import lru_cache
 from itertools import chain
 
 import numpy as np
@@ -18,7 +19,7 @@ from ahf_ros.families.claims import leading, within
 from ahf_ros.families.ring.hypotheses import Hypotheses
 from ahf_ros.families.ring.known import NOTHING_KNOWN, Prior
 from ahf_ros.families.ring.reading import read_bands
-from ahf_ros.families.ring.rivals import against_rivals, has_more, odds
+from ahf_ros.families.ring.rivals import against_rivals, odds
 from ahf_ros.prints.ring import RingPrint, canonical, words_of_prints
 from ahf_ros.vision import frame
 from ahf_ros.vision.circle_fit import Fit
@@ -51,10 +52,20 @@ def read_families(
 
 
 def _narrowest(words: dict[RingPrint, int]) -> dict[RingPrint, int]:
-    """Return words of a print without those of families that have all words of another one."""
+    """Return words of a print without those of families that have all prints of another one."""
     return {
-        code: word for code, word in words.items() if not any(has_more(code, of) for of in words)
+        code: word
+        for code, word in words.items()
+        if not any(_has_more_prints(code, of) for of in words)
     }
+
+
+@lru_cache(maxsize=256)
+def _has_more_prints(code: RingPrint, other: RingPrint) -> bool:
+    """Return whether a family has all prints of another one, and further ones."""
+    if len(code.words) <= len(other.words):
+        return False
+    return all(words_of_prints(other, other.words, [code]))
 
 
 def contested(read: Hypotheses) -> Hypotheses:

@@ -108,9 +108,7 @@ def measure_likely(
 ) -> tuple[Fit, Fit]:
     """Return better fits of the dots whose bands are worth reading, and those of the others.
 
-    The most hopeful dots come first, by their bands and by how clear they are themselves: gaps
-    between spots of light have as much of a band as small targets, but are neither round nor dark.
-    Without families, all dots are worth it.
+    The most hopeful dots come first. Without families, all dots are worth it.
     """
     others, hope = NO_FITS, np.ones(len(dots.frames))
     if families is not None:
@@ -118,8 +116,17 @@ def measure_likely(
         others = dots.select(hope <= HOPEFUL)
         dots, hope = dots.select(hope > HOPEFUL), hope[hope > HOPEFUL]
     fit = measure_dots(gray, dots, covariances=True)
-    order = np.argsort(-hope * fit.clearness**2, kind='stable')
+    order = most_hopeful(fit, hope)
     return fit.select(order[fit.share[order] >= ENOUGH]), others
+
+
+def most_hopeful(dots: Fit, hope: np.ndarray) -> np.ndarray:
+    """Return the indices of dots, the most hopeful first, shape (k,).
+
+    They come by their bands and by how clear they are themselves: gaps between spots of light have
+    as much of a band as small targets, but are neither round nor dark.
+    """
+    return np.argsort(-hope * dots.clearness**2, kind='stable')
 
 
 def measure_alike(gray: np.ndarray, dots: Dots) -> Fit:
