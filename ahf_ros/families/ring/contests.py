@@ -11,7 +11,7 @@ from ahf_ros.families.claims import Rivals, leading, owners, sole_owners, surer,
 from ahf_ros.families.ring.confidence import COVERED
 from ahf_ros.families.ring.decoding import CLEAR
 from ahf_ros.families.ring.families import decoded
-from ahf_ros.families.ring.hypotheses import Hypotheses
+from ahf_ros.families.ring.hypotheses import IN_PLACE, Hypotheses
 from ahf_ros.families.ring.rivals import has_all
 from ahf_ros.vision import frame
 from ahf_ros.vision.shape_votes import NEIGHBOURS
@@ -19,7 +19,7 @@ from ahf_ros.vision.shape_votes import NEIGHBOURS
 _CLEARLY = 2.0  # times the evidence of another claim to the same dot
 _FOREIGN = 10.0  # log odds of arcs of any length against a word, which is none then
 _OTHER_COLOUR = 0.2  # of a foreign band, that a target of the other colour counts for
-_ROUND = 0.6  # share of the edges of a word that are in their place, where there is a band
+_OF_LIGHT = 0.2  # of a foreign band, that one counts for whose edges are no ellipses
 _BY_CHANCE = 3  # places in which foreign bands may show one word by chance
 _CODED = 5.0  # odds of words against arcs of any length, before any is read
 _OVERLAP = 0.92  # of the radii of two targets, at which the paper of one hides marks of the other
@@ -39,14 +39,16 @@ def among_others(hypotheses: Hypotheses) -> Hypotheses:
     by chance has not.
 
     What has one word in many places is no print, but light or letters that repeat themselves: a
-    word speaks for others once, and against them as often as chance might read it.
+    word speaks for others once, and against them as often as chance might read it. Bands whose
+    edges are no ellipses are mostly light as well, and speak against words a little.
     """
-    arcs = (hypotheses.coded < -_FOREIGN) & (hypotheses.share > _ROUND)
-    arcs |= hypotheses.unlike > COVERED
+    whole = (hypotheses.coded < -_FOREIGN) & (hypotheses.share >= IN_PLACE)
+    prints = whole & hypotheses.exact | (hypotheses.unlike > COVERED)
+    foreign = np.where(prints, 1.0, _OF_LIGHT * whole)
     odd = np.where(_odd(hypotheses), _ODD, 1.0)
     codes, left = decoded(hypotheses)[1], hypotheses
     while True:
-        confidence = _among(hypotheses, codes, left, arcs & ~left.certain, odd)
+        confidence = _among(hypotheses, codes, left, foreign * ~left.certain, odd)
         among = replace(hypotheses, confidence=confidence)
         if np.array_equal(among.certain, left.certain):
             return among
@@ -62,7 +64,8 @@ def _among(
 ) -> np.ndarray:
     """Return the confidence of hypotheses, by how likely each is and by foreign bands, (k,).
 
-    `codes`, shape (k,), are canonical code words, and `odd` the odds against the shapes.
+    `codes`, shape (k,), are canonical code words, `foreign` says for how many foreign bands each
+    counts, and `odd` are the odds against the shapes.
     """
     left = hypotheses.confidence.copy()
     evidence = likely.certain * likely.confidence
@@ -72,8 +75,8 @@ def _among(
         has_words = np.isin(hypotheses.families, [it for it in families if has_all(code, it)])
         own = of_family & of_colour
         sure = hypotheses.confidence[own]
-        _, places = np.unique(codes[own & foreign], return_counts=True)
-        others = np.minimum(places, _BY_CHANCE).sum()
+        which = np.unique(codes[own], return_inverse=True)[1]
+        others = np.minimum(np.bincount(which, foreign[own]), _BY_CHANCE).sum()
         unlike = _OTHER_COLOUR * evidence[has_words & ~of_colour].sum()
         alike = _of_other_words(codes, evidence * (has_words & of_colour))[own] + 0.5
         by_chance = np.maximum((others + unlike + 0.5) / alike, 1) * odd[own]

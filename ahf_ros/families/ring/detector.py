@@ -30,7 +30,7 @@ from ahf_ros.families.ring.families import (
     settle_same_prints,
 )
 from ahf_ros.families.ring.full_size import at_full_size
-from ahf_ros.families.ring.hypotheses import Hypotheses
+from ahf_ros.families.ring.hypotheses import IN_PLACE, Hypotheses
 from ahf_ros.families.ring.known import WHOLE, Explained, Prior
 from ahf_ros.families.ring.parts import ImagePart, dots_in, image_parts
 from ahf_ros.families.ring.proposals import (
@@ -55,7 +55,6 @@ from ahf_ros.vision.parts import Part
 from ahf_ros.vision.pyramid import ImagePyramid, Octave, bare_pyramid, image_pyramid, octaves
 
 _PART = 128  # dots of one colour that are read at a time
-_IN_PLACE, _EXACT = 0.6, 0.5  # edges of a dot: least share of them, largest deviation, px
 
 
 @dataclass(frozen=True, slots=True)
@@ -335,13 +334,9 @@ def _read(
 
 
 def unexplained(hypotheses: Hypotheses) -> Hypotheses:
-    """Return the dots on no certain target whose edges are where they should be.
-
-    Light makes others of its edges, whose dots are mostly much larger and little like ellipses.
-    """
+    """Return the dots on no certain target whose edges are where they should be."""
     explained = Explained.by(hypotheses.select(hypotheses.certain))
-    exact = hypotheses.deviation * frame.mean_radii(hypotheses.frames) < _EXACT
-    exact &= hypotheses.share >= _IN_PLACE
+    exact = hypotheses.exact & (hypotheses.share >= IN_PLACE)
     left = hypotheses.select(exact & ~hypotheses.certain)
     return left.select(~explained.on_them(left.frames, 0))
 

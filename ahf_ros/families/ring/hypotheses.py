@@ -16,6 +16,10 @@ from ahf_ros.vision.growth import growth_in_light
 CERTAIN = 0.75
 """Confidence from which words are reported."""
 
+IN_PLACE = 0.6
+"""Share of the edges of a print that are where they should be, at least."""
+
+_EXACT = 0.5  # deviation of the edges of a print, px, at the most
 _CLEAR = 5.0  # log odds of a word against arcs of any length, up to which others may be right
 
 
@@ -85,6 +89,14 @@ class Hypotheses(ArrayRecord):
     def clear(self) -> np.ndarray:
         """Whether no other family may explain the bands of certain words better, shape (k,)."""
         return self.certain & (self.coded > _CLEAR)
+
+    @property
+    def exact(self) -> np.ndarray:
+        """Whether edges are ellipses, ndarray of bool, shape (k,).
+
+        Light makes dots of its edges, too, which are mostly much larger and little like ellipses.
+        """
+        return np.asarray(self.deviation * frame.mean_radii(self.frames) < _EXACT)
 
     @property
     def print_growth(self) -> np.ndarray:
