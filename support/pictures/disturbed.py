@@ -115,7 +115,7 @@ def overlapping(
     """
     sheet = target_sheet(name, numbers, seed, radius=radius, cell=_CELL)
     generator = np.random.default_rng([seed, 3])
-    free = np.setdiff1d(np.arange(1, family(name).words.size + 1), numbers)
+    free = np.setdiff1d(family(name).numbers, numbers)
     above = generator.permutation(free)[: len(numbers)].tolist()
     directions = generator.uniform(0, 2 * math.pi, len(numbers)).tolist()
     papers = occluders.other_targets(name, above, distance, directions)

@@ -10,7 +10,7 @@ from ahf_ros.prints.ring import FAMILY_NAMES, family
 from ahf_ros.prints.square import SQUARE_NAMES
 from benchmarks import disturbances
 from support.pictures import occluders
-from support.pictures.disturbed import Targets
+from support.pictures.disturbed import Targets, overlapping
 from support.pictures.exposure import Cell, Exposure, Occluder
 from support.pictures.lookalikes import LOOKALIKES, other_sectors, other_words
 from support.pictures.sheets import CELL, cell_pixels, mark_sheet, random_numbers, target_sheet
@@ -48,6 +48,16 @@ def test_the_truth_is_where_the_marks_are(name: str) -> None:
         weight = np.maximum(image[:side, :side][dot], 0)
         assert np.average(columns[dot], weights=weight) == pytest.approx(first.x, abs=0.1)
         assert np.average(rows[dot], weights=weight) == pytest.approx(first.y, abs=0.1)
+
+
+@pytest.mark.parametrize('name', ['aicon12', 'cct12'])
+def test_targets_on_others_have_words_of_their_own(name: str) -> None:
+    """IDs of `cct12` are words, not counted from 1."""
+    [below] = random_numbers(name, 6, 3)
+    _, truth = overlapping(name, below, 3, 4.0)
+    shown = [it.id for it in truth]
+    assert (shown[:6], len(set(shown))) == (below.tolist(), 12)
+    assert set(shown) <= set(family(name).numbers.tolist())
 
 
 def test_a_sheet_is_the_same_every_time_and_another_one_with_another_seed() -> None:
