@@ -11,7 +11,7 @@ from ahf_ros.families.claims import Rivals, leading, owners, sole_owners, surer,
 from ahf_ros.families.ring.confidence import COVERED
 from ahf_ros.families.ring.decoding import CLEAR
 from ahf_ros.families.ring.families import decoded
-from ahf_ros.families.ring.hypotheses import IN_PLACE, Hypotheses
+from ahf_ros.families.ring.hypotheses import Hypotheses
 from ahf_ros.families.ring.rivals import has_all
 from ahf_ros.vision import frame
 from ahf_ros.vision.shape_votes import NEIGHBOURS
@@ -42,9 +42,9 @@ def among_others(hypotheses: Hypotheses) -> Hypotheses:
     word speaks for others once, and against them as often as chance might read it. Bands whose
     edges are no ellipses are mostly light as well, and speak against words a little.
     """
-    whole = (hypotheses.coded < -_FOREIGN) & (hypotheses.share >= IN_PLACE)
-    prints = whole & hypotheses.exact | (hypotheses.unlike > COVERED)
-    foreign = np.where(prints, 1.0, _OF_LIGHT * whole)
+    arcs = (hypotheses.coded < -_FOREIGN) & hypotheses.in_place
+    prints = arcs & hypotheses.exact | (hypotheses.unlike > COVERED)
+    foreign = np.where(prints, 1.0, _OF_LIGHT * arcs)
     odd = np.where(_odd(hypotheses), _ODD, 1.0)
     codes, left = decoded(hypotheses)[1], hypotheses
     while True:

@@ -30,7 +30,7 @@ from ahf_ros.families.ring.families import (
     settle_same_prints,
 )
 from ahf_ros.families.ring.full_size import at_full_size
-from ahf_ros.families.ring.hypotheses import IN_PLACE, Hypotheses
+from ahf_ros.families.ring.hypotheses import Hypotheses
 from ahf_ros.families.ring.known import WHOLE, Explained, Prior
 from ahf_ros.families.ring.parts import ImagePart, dots_in, image_parts
 from ahf_ros.families.ring.proposals import (
@@ -336,8 +336,8 @@ def _read(
 def unexplained(hypotheses: Hypotheses) -> Hypotheses:
     """Return the dots on no certain target whose edges are where they should be."""
     explained = Explained.by(hypotheses.select(hypotheses.certain))
-    exact = hypotheses.exact & (hypotheses.share >= IN_PLACE)
-    left = hypotheses.select(exact & ~hypotheses.certain)
+    dots = hypotheses.in_place & hypotheses.exact
+    left = hypotheses.select(dots & ~hypotheses.certain)
     return left.select(~explained.on_them(left.frames, 0))
 
 

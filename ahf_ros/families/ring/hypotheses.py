@@ -16,10 +16,7 @@ from ahf_ros.vision.growth import growth_in_light
 CERTAIN = 0.75
 """Confidence from which words are reported."""
 
-IN_PLACE = 0.6
-"""Share of the edges of a print that are where they should be, at least."""
-
-_EXACT = 0.5  # deviation of the edges of a print, px, at the most
+_IN_PLACE, _EXACT = 0.6, 0.5  # edges of a print: least share of them, largest deviation, px
 _CLEAR = 5.0  # log odds of a word against arcs of any length, up to which others may be right
 
 
@@ -89,6 +86,11 @@ class Hypotheses(ArrayRecord):
     def clear(self) -> np.ndarray:
         """Whether no other family may explain the bands of certain words better, shape (k,)."""
         return self.certain & (self.coded > _CLEAR)
+
+    @property
+    def in_place(self) -> np.ndarray:
+        """Whether enough edges are where those of a print are, ndarray of bool, shape (k,)."""
+        return np.asarray(self.share >= _IN_PLACE)
 
     @property
     def exact(self) -> np.ndarray:
