@@ -157,7 +157,10 @@ static void paper_and_ink(count m, look of, const float *restrict lower, const f
         spread[a] = sqrtf(flat * flat + of_noise * of_noise + of_ground * of_ground);
         float as_paper = normal_density_f(logarithm_f(level / blank), spread[a]);
         anything[a] = of.plain * as_paper + (1 - of.plain) * of.any;
-        float ink_ground = of_ground * (gray_ink / greater_f(beside[a], 1)) * (below / of_ink);
+        /* An error of ground is one of its light, also where that is black. */
+        float some = greater_f(beside[a], 1);
+        float gain = printed(of, some, marked[a], marked_here[a], here[a]) / some;
+        float ink_ground = of_ground * gain * (below / of_ink);
         known[a] = of_noise * of_noise + ink_ground * ink_ground;
         float low = sqrtf(of.mark * of.mark + known[a]);
         float high = sqrtf(of.tail * of.tail + known[a]);
@@ -171,6 +174,8 @@ static void paper_and_ink(count m, look of, const float *restrict lower, const f
         under_glare = more < 0 ? under_glare : 0;
         under_glare = more > -size ? under_glare : 0;
         as_ink = greater_f(as_ink, under_glare);
+        if (of.brightest > 0)
+            as_ink = greater_f(as_ink, in_the_dark(of, 1, gray_ink, here[a], of.noise));
         mark[a] = step;
         mean_width[a] = (low + high) / 2;
         paper[a] = counts[a] * log_odds(of, as_paper, of.doubt, anything[a]);
@@ -189,10 +194,13 @@ static void mixed_ink(count m, look of, float share, const float *restrict besid
     for (count a = 0; a < m; a++) {
         float on_ground = bare[a] + share * (marked[a] - bare[a]);
         float on_band = bare_here[a] + share * (marked_here[a] - bare_here[a]);
-        float mixed = raised(of, printed(of, beside[a], on_ground, on_band, here[a]));
+        float gray_mixed = printed(of, beside[a], on_ground, on_band, here[a]);
+        float mixed = raised(of, gray_mixed);
         float of_share = of.share * mark[a];
         float width = sqrtf(of.mark * of.mark + of_share * of_share + known[a]);
         float density = normal_density_f(logarithm_f(raised(of, here[a]) / mixed), width);
+        if (of.brightest > 0)
+            density = greater_f(density, in_the_dark(of, share, gray_mixed, here[a], of.noise));
         odds[a] = counts[a] * log_odds(of, density, of.at_ends, anything[a]);
     }
 }
@@ -278,7 +286,7 @@ static void covered_ground(count m, count n, look of, const target *it, float li
    edge of light between neighbours. */
 void edge_evidence(rows k, count i, count c, count m, count n, const float gray[i][c][m],
                    const int64_t row[k], const double reach[k][m], const double plate[k][m],
-                   const double looks_of[k][8], const double edges[k][3], const float weight[k],
+                   const double looks_of[k][9], const double edges[k][3], const float weight[k],
                    const float shares[n], const double deciding[24], float looks[k][2][n][m],
                    float typical[k][2][2][m], bool covered[k][2][m], float lit[k],
                    float read[2][7][m], float steps[7][m])
@@ -305,7 +313,7 @@ void edge_evidence(rows k, count i, count c, count m, count n, const float gray[
 /* The same of paper and of ink at s places of edges, both edges together. */
 void shifted_evidence(rows k, count i, count c, count m, count s, const float gray[i][c][m],
                       const int64_t row[k], const double reach[k][m], const double plate[k][m],
-                      const double looks_of[k][8], const double edges[k][s][3],
+                      const double looks_of[k][9], const double edges[k][s][3],
                       const float weight[k], const double deciding[24], float looks[k][s][2][m],
                       float read[2][7][m], float steps[7][m], float of_edges[2][2][m])
 {

@@ -37,18 +37,25 @@ static void compare(count m, look of, const numbers *by, float share, const floa
         mixed_width[a] = sqrtf(ink_width + mixed * mixed);
         paper[a] = normal_density_f(away, width[a]);
         ink[a] = normal_density_f(away - step, sqrtf(ink_width));
+        if (of.brightest > 0)
+            ink[a] = greater_f(ink[a], in_the_dark(of, share, gray_ink, gray[a], known * below));
         anything[a] = of.plain * paper[a] + (1 - of.plain) * of.any;
     }
 }
 
 /* The density of a share of ink between. */
 static void compare_mixed(count m, look of, float share, const float *restrict gray,
-                          const float *restrict light, const float *restrict width,
-                          float *restrict density)
+                          const float *restrict light, const float *restrict spread,
+                          const float *restrict width, float *restrict density)
 {
     for (count a = 0; a < m; a++) {
-        float mixed = raised(of, printed(of, light[a], 0, share, gray[a]));
+        float known = spread[a] < NEVER_SEEN ? spread[a] : 1;
+        float gray_mixed = printed(of, light[a], 0, share, gray[a]);
+        float mixed = raised(of, gray_mixed);
         density[a] = normal_density_f(logarithm_f(raised(of, gray[a]) / mixed), width[a]);
+        if (of.brightest > 0)
+            density[a] = greater_f(density[a], in_the_dark(of, share, gray_mixed, gray[a],
+                                                           known * raised(of, light[a])));
     }
 }
 
@@ -88,7 +95,7 @@ static float behind_a_plate(count d, count m, const bool near[d], const numbers 
 void level_evidence(rows k, count d, count m, count n, const float levels[k][d][m],
                     const float light[k][d][m], const float spread[k][d][m], const double radii[d],
                     const double band[2], const double edges[k][2], const double reach[k][m],
-                    const double looks_of[k][8], const float weight[k], const float shares[n],
+                    const double looks_of[k][9], const float weight[k], const float shares[n],
                     const double deciding[24], float looks[k][2][n][m], float dot[k], float lit[k],
                     bool covered[k][2][m], float read[d][7][m], float densities[d][n][m],
                     float rows[2][m], float odds[n][m], double scratch[d][m], bool places[6][d])
@@ -129,7 +136,7 @@ void level_evidence(rows k, count d, count m, count n, const float levels[k][d][
             compare(m, of, &by, share, gray, paper, spread[b][j], at[LEVEL], at[LIGHT], at[NOISE],
                     at[WIDTH], at[MIXED_WIDTH], at[ANYTHING], densities[j][0], densities[j][n - 1]);
             for (count s = 1; s < n - 1; s++)
-                compare_mixed(m, of, share * shares[s], gray, paper, at[MIXED_WIDTH],
+                compare_mixed(m, of, share * shares[s], gray, paper, spread[b][j], at[MIXED_WIDTH],
                               densities[j][s]);
             for (count a = 0; a < m; a++)
                 at[COUNTS][a] = spread[b][j][a] < NEVER_SEEN && gray[a] < of.told_below &&

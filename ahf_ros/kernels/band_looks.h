@@ -21,12 +21,12 @@ typedef struct {
 
 /* How a target looks: circle, px, gray values; what of it is drawn. */
 typedef struct {
-    double outermost, size, blur, polarity, contrast, noise, shade, glare;
+    double outermost, size, blur, polarity, contrast, noise, shade, glare, brightest;
 } target;
 
 /* Ink over paper, how white ink is, and how steps of ln are spread, in one target. */
 typedef struct {
-    float ink, offset, white, white_ink, glare, told_below;
+    float ink, offset, white, white_ink, glare, brightest, told_below;
     float flat, of_white, mark, tail, share, noise, plain, any, doubt, at_ends;
 } look;
 
@@ -37,7 +37,7 @@ static inline look look_of(const numbers *of, const target *it, float doubt)
     /* White paper may be ink under glare, but white ink on dark ground is ink. */
     return (look){.ink = dark ? contrast : 1 / contrast, .offset = (float)of->offset,
                   .white = white, .white_ink = dark ? NEVER_SEEN : white,
-                  .glare = (float)it->glare,
+                  .glare = (float)it->glare, .brightest = (float)it->brightest,
                   .told_below = !dark || it->glare > NEVER_SEEN ? NEVER_SEEN : white,
                   .flat = (float)of->flat,
                   .of_white = (float)(it->glare <= of->white ? of->flat_white : of->flat),
@@ -69,6 +69,16 @@ static inline float printed(look of, float ground, float of_ground, float share,
 }
 
 static inline float raised(look of, float gray) { return greater_f(gray, 0) + of.offset; }
+
+/* Density of ln of what is seen of a share of bright ink, whose ground is black: an error of that leaves
+   its light open, up to the brightest. */
+static inline float in_the_dark(look of, float share, float ink, float seen, float of_ground)
+{
+    float most = share * of.brightest, mean = lesser_f(ink, most), usual = of.mark * mean;
+    float of_light = lesser_f(share * of_ground * of.ink, most);
+    float error = sqrtf(of_light * of_light + of.noise * of.noise + usual * usual);
+    return raised(of, seen) * normal_density_f(seen - mean, error);
+}
 
 /* Log odds of a density, unless light that nothing predicts is there. */
 static inline float log_odds(look of, float density, float doubt, float anything)

@@ -51,13 +51,13 @@ void gray_at(count k, count i, count c, count m, count r, const float gray[i][c]
              const double radii[k][r], float values[k][r][m]);
 void edge_evidence(rows k, count i, count c, count m, count n, const float gray[i][c][m],
                    const int64_t row[k], const double reach[k][m], const double plate[k][m],
-                   const double looks_of[k][8], const double edges[k][3], const float weight[k],
+                   const double looks_of[k][9], const double edges[k][3], const float weight[k],
                    const float shares[n], const double deciding[24], float looks[k][2][n][m],
                    float typical[k][2][2][m], bool covered[k][2][m], float lit[k],
                    float read[2][7][m], float steps[7][m]);
 void shifted_evidence(rows k, count i, count c, count m, count s, const float gray[i][c][m],
                       const int64_t row[k], const double reach[k][m], const double plate[k][m],
-                      const double looks_of[k][8], const double edges[k][s][3],
+                      const double looks_of[k][9], const double edges[k][s][3],
                       const float weight[k], const double deciding[24], float looks[k][s][2][m],
                       float read[2][7][m], float steps[7][m], float of_edges[2][2][m]);
 
@@ -66,7 +66,7 @@ void shifted_evidence(rows k, count i, count c, count m, count s, const float gr
 void level_evidence(rows k, count d, count m, count n, const float levels[k][d][m],
                     const float light[k][d][m], const float spread[k][d][m], const double radii[d],
                     const double band[2], const double edges[k][2], const double reach[k][m],
-                    const double looks_of[k][8], const float weight[k], const float shares[n],
+                    const double looks_of[k][9], const float weight[k], const float shares[n],
                     const double deciding[24], float looks[k][2][n][m], float dot[k], float lit[k],
                     bool covered[k][2][m], float read[d][7][m], float densities[d][n][m],
                     float rows[2][m], float odds[n][m], double scratch[d][m], bool places[6][d]);

@@ -61,6 +61,7 @@ def polar(
         plate=np.full((1, ANGLES), np.inf),
         shade=np.array([shade], np.float32),
         glare=np.array([glare], np.float32),
+        brightest=np.zeros(1),
     )
 
 
@@ -136,6 +137,16 @@ def test_marks_under_glare_are_ink_though_their_steps_are_small(added: float) ->
     evidence = edges(glossy)
     assert (evidence.ink > evidence.paper)[..., MARKED].all()
     assert (evidence.ink <= evidence.paper)[..., ~MARKED].all()
+
+
+@pytest.mark.parametrize('light', [1.0, 0.4, 0.2])
+def test_bright_marks_in_shadow_are_ink_though_black_ground_does_not_tell_it(light: float) -> None:
+    night = replace(polar(60.0, -1, contrast=0.05), noise=np.array([3.0]))
+    night.gray[..., ~MARKED | (np.arange(ANGLES) % 2 > 0)] *= light
+    night.gray[night.gray < 10] = 0.0  # black that a camera clips
+    seen = edges(replace(night, brightest=np.array([60.0])))
+    assert (seen.ink > seen.paper)[..., MARKED].all()
+    assert (seen.ink < seen.paper)[..., ~MARKED].all()
 
 
 def test_readings_of_neighbours_that_are_alike_share_one_weight() -> None:

@@ -72,7 +72,7 @@ class Band:
     gray: np.ndarray
     reach: np.ndarray
     plate: np.ndarray
-    looks: np.ndarray  # outermost, size, blur, polarity, contrast, noise, shade, glare
+    looks: np.ndarray  # outermost, size, blur, polarity, contrast, noise, shade, glare, brightest
     edges: np.ndarray
     weight: float
 
@@ -85,7 +85,7 @@ class Band:
             *(generator.choice([0, 80, 150]), generator.choice([200, 256, np.inf])),
         ]
         top = generator.choice([100, 200, 260])
-        return Band(
+        band = Band(
             gray=generator.uniform(0, top, (CIRCLES, ANGLES)).astype(np.float32),
             reach=np.where(generator.random(ANGLES) < 0.7, np.inf, 3.0),
             plate=np.where(generator.random(ANGLES) < 0.3, plates, np.inf),
@@ -93,6 +93,9 @@ class Band:
             edges=np.array([1.0, generator.uniform(1.8, 2.2), generator.uniform(2.6, 3)]),
             weight=generator.uniform(0.2, 1),
         )
+        of_ink = generator.choice([0, 60, 220]) if band.looks[3] < 0 else 0
+        band.looks = np.append(band.looks, of_ink)
+        return band
 
     def gray_at(self, radius: float, angle: int) -> float:
         return float(np.interp(radius, CIRCLE_RADII, self.gray[:, angle].astype(float)))
@@ -131,7 +134,7 @@ class Band:
         self, side: int, a: int, shares: tuple[float, ...]
     ) -> tuple[list[float], list[float]]:
         """Return the evidence for shares of ink, and what paper and ink give on average."""
-        *_, polarity, contrast, noise, _, glare = self.looks
+        *_, polarity, contrast, noise, _, glare, brightest = self.looks
         lit, dark = self.lit(), bool(polarity > 0)
         (beside, bare, marked, here, bare_here, marked_here), counts = self.read(side, a)
         ink_of = here, float(np.float32(contrast)), dark
@@ -144,20 +147,30 @@ class Band:
         paper = density(level(here) - level(blank), spread)
         mark = level(ink) - level(beside)
         more = (level(here) - level(ink)) * np.sign(mark)
-        of_ink = of_ground * ink / max(beside, 1) * (beside + OFFSET) / (ink + OFFSET)
+        gain = printed(max(beside, 1), marked, marked_here, *ink_of) / max(beside, 1)
+        of_ink = of_ground * gain * (beside + OFFSET) / (ink + OFFSET)
         known = of_noise**2 + of_ink**2
         low, high = math.sqrt(MARK**2 + known), math.sqrt(TAIL**2 + known)
         width = high if more > 0 else low
         inked = density(more, width) * 2 * width / (low + high)
         if beside >= glare and -abs(mark) < more < 0:
             inked = max(inked, 1 / max(abs(mark), FLAT))
+
+        def in_the_dark(part: float, gray: float) -> float:
+            usual, most = min(gray, part * brightest), part * brightest
+            of_light = min(part * noise / contrast, most)
+            error = math.sqrt(of_light**2 + noise**2 + (MARK * usual) ** 2)
+            return (here + OFFSET) * density(here - usual, error) if brightest else 0
+
+        inked = max(inked, in_the_dark(1, ink))
         anything = PLAIN * paper + (1 - PLAIN) * ANY
         width = math.sqrt(MARK**2 + (SHARE * mark) ** 2 + known)
         densities, doubts = [paper], [lit]
         for part in shares:
             on_ground, on_band = bare + part * (marked - bare), part * (marked_here - bare_here)
             mixed = printed(beside, on_ground, bare_here + on_band, *ink_of)
-            densities.append(density(level(here) - level(mixed), width))
+            of_part = density(level(here) - level(mixed), width)
+            densities.append(max(of_part, in_the_dark(part, mixed)))
             doubts.append(max(lit, AT_ENDS))
         told = here < WHITE or not dark or np.isinf(glare)
         weight = counts if told else 0
@@ -177,7 +190,7 @@ class Band:
 
     def covered(self, ink_over_paper: np.ndarray) -> np.ndarray:
         """Return where something covers the ground, (2, m), from the evidence, (2, m)."""
-        *_, polarity, contrast, _, shade, _ = self.looks
+        *_, polarity, contrast, _, shade, _, _ = self.looks
         dark, step = bool(polarity > 0), contrast if polarity > 0 else 1 / contrast
         places = list(itertools.product(range(2), range(ANGLES)))
         ground, band, lit, seen = {}, {}, {}, {}

@@ -11,9 +11,10 @@ from support.plain_values import below
 
 OFFSET, WHITE, LIGHT_EDGE, LEAST, MOST = 8.0, 250.0, 0.3, 0.05, 0.5
 SHARE, ANY, PLAIN, PAPER, INK, UNLIKELY = 0.12, 0.22, 0.35, 0.05, 0.12, 2.5
+MARK = 0.18
 DECIDING = np.zeros(24)
 DECIDING[[1, 2, 9, 10, 11]] = OFFSET, WHITE, LIGHT_EDGE, LEAST, MOST
-DECIDING[[17, 18, 19, 21, 22, 23]] = SHARE, ANY, PLAIN, PAPER, INK, UNLIKELY
+DECIDING[[15, 17, 18, 19, 21, 22, 23]] = MARK, SHARE, ANY, PLAIN, PAPER, INK, UNLIKELY
 BAND, RADII = (2.25, 3.5), np.array([0.5, 1.5, 1.8, 2.5, 2.8, 3.1, 3.3, 3.8, 4.1])
 ANGLES = 6
 
@@ -43,8 +44,10 @@ def test_levels_are_compared_by_their_densities(seed: int, shares: tuple[float, 
     size, blur, noise = (generator.uniform(*of, k) for of in ((5, 20), (0.5, 2), (1, 5)))
     polarity, contrast = generator.choice([-1.0, 1.0], k), generator.uniform(0.2, 0.5, k)
     shade, glare = generator.choice([0, 80.0], k), generator.choice([200, 256, np.inf], k)
-    looks_of = np.stack([0 * size, size, blur, polarity, contrast, noise, shade, glare], axis=1)
     weight, every = np.float32(generator.uniform(0.2, 1, k)), np.float32([0, *shares, 1])
+    brightest = np.where(polarity < 0, generator.choice([0, 60, 220], k), 0)
+    of_looks = 0 * size, size, blur, polarity, contrast, noise, shade, glare, brightest
+    looks_of = np.stack(of_looks, axis=1)
     looks, dot, lit, covered, *_ = kernels.level_evidence(
         *(levels, light, spread, RADII, BAND, edges, reach, looks_of, weight, every, DECIDING)
     )
@@ -82,10 +85,25 @@ def test_levels_are_compared_by_their_densities(seed: int, shares: tuple[float, 
             ink_width = math.sqrt(INK**2 + of_noise**2 + (known * gain) ** 2)
             mixed_width = math.hypot(ink_width, SHARE * (level(ink) - level(paper)))
             densities = [density(level(here) - level(paper), width)]
+
+            def in_the_dark(
+                part: float,
+                gray: float,
+                b: int = b,
+                here: float = here,
+                of_ground: float = known * (paper + OFFSET),
+            ) -> float:
+                usual, most = min(gray, part * brightest[b]), part * brightest[b]
+                of_light = min(part * of_ground / contrast[b], most)
+                error = math.sqrt(of_light**2 + noise[b] ** 2 + (MARK * usual) ** 2)
+                return (here + OFFSET) * density(here - usual, error) if brightest[b] else 0
+
             for of in shares:
-                away = level(here) - level(printed(j, a, share * of))
-                densities.append(density(away, mixed_width))
-            densities.append(density(level(here) - level(ink), ink_width))
+                mixed = printed(j, a, share * of)
+                of_part = density(level(here) - level(mixed), mixed_width)
+                densities.append(max(of_part, in_the_dark(share * of, mixed)))
+            inked = density(level(here) - level(ink), ink_width)
+            densities.append(max(inked, in_the_dark(share, ink)))
             errors[j, a], widths[j, a], odds_of[j, a] = (
                 level(here) - level(paper),
                 width,
@@ -133,6 +151,6 @@ def test_no_value_leads_beyond_an_array(value: float) -> None:
         rows, deciding = np.full((1, d, 3), value), np.full(24, value)
         looks, *_ = kernels.level_evidence(
             *(rows, rows, rows, np.full(d, value), [value, value], np.full((1, 2), value)),
-            *(np.full((1, 3), value), np.full((1, 8), value), [value], [0, 1], deciding),
+            *(np.full((1, 3), value), np.full((1, 9), value), [value], [0, 1], deciding),
         )
         assert looks.shape == (1, 2, 2, 3)

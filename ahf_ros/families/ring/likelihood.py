@@ -205,7 +205,7 @@ def shifted_evidence(
 def _on_circles(polar: PolarImages) -> tuple[np.ndarray, ...]:
     """Return polar images as kernels take them."""
     of = polar.outermost, polar.size, polar.blur, polar.polarity, polar.contrast, polar.noise
-    looks = np.stack([*of, polar.shade, polar.glare], axis=1)
+    looks = np.stack([*of, polar.shade, polar.glare, polar.brightest], axis=1)
     return polar.gray, polar.row, polar.reach, polar.plate, looks
 
 

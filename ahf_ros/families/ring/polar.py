@@ -95,6 +95,9 @@ class PolarImages(ArrayRecord):
     shade, glare : ndarray of float32, shape (k,)
         Gray values of ground up to which something covers it, of dark ground from which on, and
         from which glare lies on it; infinite where white is paper.
+    brightest : ndarray of float64, shape (k,)
+        Gray value of the bright dot, which is that of its ink in full light, where black ground is
+        left as it is: noise hides in it how much light there is. 0 elsewhere.
     """
 
     gray: np.ndarray
@@ -110,6 +113,7 @@ class PolarImages(ArrayRecord):
     plate: np.ndarray
     shade: np.ndarray
     glare: np.ndarray
+    brightest: np.ndarray
 
     @property
     def radii(self) -> np.ndarray:
@@ -188,7 +192,9 @@ def polar_images(
     inner, outer = band
     outermost = outer + _MARGIN
     radii = np.linspace(INNERMOST, outermost, circles)
+    ratio = lift_ratio(gray, dots, band) if ratio is None else ratio
     contrast, lift = _appearance(gray, dots, band, ratio)
+    bright = dots.polarity < 0
     values, reach = on_circles(gray, dots.frames, angles_of(count), radii, lift)
     ground = values[:, [np.abs(radii - place).argmin() for place in _on_ground(band)]]
     apart = 2 * np.pi * inner * dots.size / count
@@ -209,6 +215,7 @@ def polar_images(
         plate=np.full((len(values), count), np.inf),
         shade=shade,
         glare=glare,
+        brightest=np.where(bright & np.equal(ratio, AS_IT_IS), dots.bright, 0.0),
     )
 
 
@@ -231,7 +238,7 @@ def on_circles(
 
 
 def _appearance(
-    gray: np.ndarray, dots: Fit, band: tuple[float, float], ratio: np.ndarray | float | None
+    gray: np.ndarray, dots: Fit, band: tuple[float, float], ratio: np.ndarray | float
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return contrasts of dots, and gray values that black is to be lifted to, shape (k,) each.
 
@@ -256,7 +263,6 @@ def _appearance(
     contrast = np.maximum(dots.contrast, np.minimum(by_levels, PRINTED))
     narrow = (inner - 1) * dots.size < _NARROW * np.maximum(dots.blur, USUAL_BLUR)
     contrast = np.where(narrow, np.minimum(contrast, np.maximum(bare, PRINTED)), contrast)
-    ratio = lift_ratio(gray, dots, band) if ratio is None else ratio
     lift = black_lift(contrast, dots.bright, ratio)
     dark, bright = (lifted(of, lift) for of in (contrast * dots.bright, dots.bright))
     return np.maximum(dark, _MINIMUM_LEVEL) / np.maximum(bright, _MINIMUM_LEVEL), lift

@@ -44,7 +44,7 @@ from ahf_ros.families.ring.polar import (
     on_dark_ground,
     polar_images,
 )
-from ahf_ros.prints.ring import RingPrint, least_marked
+from ahf_ros.prints.ring import RingPrint, canonical, least_marked
 from ahf_ros.vision import frame
 from ahf_ros.vision.black import AS_IT_IS, BLACK, NEARLY_LINEAR, PRINTED
 from ahf_ros.vision.circle_fit import ENOUGH, NO_FITS, Fit, fit_circles
@@ -139,7 +139,8 @@ def _read_part(
     Black marks in uneven light are read as they are, and those in doubt with the black of prints.
     Ground that is darker than ink is in prints is uneven by light or by sharpening. Bright targets
     on it that are in doubt, or in uneven light, are read without a lift of black as well, and then
-    nearly in gray values.
+    nearly in gray values. Lifted black hides marks in shadow: what it shows is less sure
+    by the margin of another word that was read before.
     """
     ratio = lift_ratio(gray, fit, family.band)
     read = _read_lifted(gray, fit, family, prior, least, ratio)
@@ -148,8 +149,11 @@ def _read_part(
         """Return what is read, some of it with another lift of black where that makes it surer."""
         if not some.size:
             return read
+        before = read.select(some)
         other = _read_lifted(gray, fit.select(some), family, prior, -np.inf, lift)
-        surer = other.certain | (other.confidence > read.confidence[some])
+        if lift > AS_IT_IS:
+            other = _against(before, other, family)
+        surer = other.certain | (other.confidence > before.confidence)
         return read.replaced(some[surer], other.select(surer))
 
     doubtful = ~read.certain & (read.confidence >= _POSSIBLE)
@@ -161,6 +165,16 @@ def _read_part(
         read = again(read, black[uneven | ~read.certain[black]], AS_IT_IS)
     some = np.flatnonzero(bright & ~read.certain & (fit.contrast < PRINTED))
     return again(read, some, NEARLY_LINEAR)
+
+
+def _against(before: Hypotheses, read: Hypotheses, family: RingPrint) -> Hypotheses:
+    """Return what is read, less sure by the margin of what was read before where that differs."""
+    both = np.flatnonzero((before.words > 0) & (read.words > 0))
+    known, ids = (canonical(of.words[both], family)[1] for of in (before, read))
+    differ = both[ids != known]
+    margin = read.margin.copy()
+    margin[differ] -= np.maximum(before.margin[differ], 0)
+    return rated(replace(read, margin=margin))
 
 
 def _read_lifted(
