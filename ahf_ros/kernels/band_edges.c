@@ -173,14 +173,17 @@ static void paper_and_ink(count m, look of, const float *restrict lower, const f
         under_glare = beside[a] >= of.glare ? under_glare : 0;
         under_glare = more < 0 ? under_glare : 0;
         under_glare = more > -size ? under_glare : 0;
-        as_ink = greater_f(as_ink, under_glare);
-        if (of.brightest > 0)
-            as_ink = greater_f(as_ink, in_the_dark(of, 1, gray_ink, here[a], of.noise));
+        ink[a] = greater_f(as_ink, under_glare);
         mark[a] = step;
         mean_width[a] = (low + high) / 2;
         paper[a] = counts[a] * log_odds(of, as_paper, of.doubt, anything[a]);
-        ink[a] = counts[a] * log_odds(of, as_ink, of.doubt, anything[a]);
     }
+    for (count a = 0; a < m && of.brightest > 0; a++) {
+        float gray_ink = printed(of, beside[a], marked[a], marked_here[a], here[a]);
+        ink[a] = greater_f(ink[a], in_the_dark(of, 1, gray_ink, here[a], of.noise));
+    }
+    for (count a = 0; a < m; a++)
+        ink[a] = counts[a] * log_odds(of, ink[a], of.doubt, anything[a]);
 }
 
 /* The same of a share of ink between paper and ink. */
@@ -194,15 +197,19 @@ static void mixed_ink(count m, look of, float share, const float *restrict besid
     for (count a = 0; a < m; a++) {
         float on_ground = bare[a] + share * (marked[a] - bare[a]);
         float on_band = bare_here[a] + share * (marked_here[a] - bare_here[a]);
-        float gray_mixed = printed(of, beside[a], on_ground, on_band, here[a]);
-        float mixed = raised(of, gray_mixed);
+        float mixed = raised(of, printed(of, beside[a], on_ground, on_band, here[a]));
         float of_share = of.share * mark[a];
         float width = sqrtf(of.mark * of.mark + of_share * of_share + known[a]);
-        float density = normal_density_f(logarithm_f(raised(of, here[a]) / mixed), width);
-        if (of.brightest > 0)
-            density = greater_f(density, in_the_dark(of, share, gray_mixed, here[a], of.noise));
-        odds[a] = counts[a] * log_odds(of, density, of.at_ends, anything[a]);
+        odds[a] = normal_density_f(logarithm_f(raised(of, here[a]) / mixed), width);
     }
+    for (count a = 0; a < m && of.brightest > 0; a++) {
+        float on_ground = bare[a] + share * (marked[a] - bare[a]);
+        float on_band = bare_here[a] + share * (marked_here[a] - bare_here[a]);
+        float mixed = printed(of, beside[a], on_ground, on_band, here[a]);
+        odds[a] = greater_f(odds[a], in_the_dark(of, share, mixed, here[a], of.noise));
+    }
+    for (count a = 0; a < m; a++)
+        odds[a] = counts[a] * log_odds(of, odds[a], of.at_ends, anything[a]);
 }
 
 /* What paper and ink give on average if they look as they should. */

@@ -10,6 +10,18 @@
    and from shares of ink; what counts; and density of anything. */
 enum { LEVEL, LIGHT, NOISE, WIDTH, MIXED_WIDTH, COUNTS, ANYTHING, READ };
 
+/* Raise the densities of a share of ink to those of bright ink on black ground. */
+static void shares_in_the_dark(count m, look of, float share, const float *restrict gray,
+                               const float *restrict light, const float *restrict spread,
+                               float *restrict density)
+{
+    for (count a = 0; a < m && of.brightest > 0; a++) {
+        float known = spread[a] < NEVER_SEEN ? spread[a] : 1;
+        float ink = printed(of, light[a], 0, share, gray[a]), error = known * raised(of, light[a]);
+        density[a] = greater_f(density[a], in_the_dark(of, share, ink, gray[a], error));
+    }
+}
+
 /* Compare the levels of one circle, of which blur makes a share ink, with paper and ink. No array is
    another one. */
 static void compare(count m, look of, const numbers *by, float share, const float *restrict gray,
@@ -37,10 +49,9 @@ static void compare(count m, look of, const numbers *by, float share, const floa
         mixed_width[a] = sqrtf(ink_width + mixed * mixed);
         paper[a] = normal_density_f(away, width[a]);
         ink[a] = normal_density_f(away - step, sqrtf(ink_width));
-        if (of.brightest > 0)
-            ink[a] = greater_f(ink[a], in_the_dark(of, share, gray_ink, gray[a], known * below));
         anything[a] = of.plain * paper[a] + (1 - of.plain) * of.any;
     }
+    shares_in_the_dark(m, of, share, gray, light, spread, ink);
 }
 
 /* The density of a share of ink between. */
@@ -49,14 +60,10 @@ static void compare_mixed(count m, look of, float share, const float *restrict g
                           const float *restrict width, float *restrict density)
 {
     for (count a = 0; a < m; a++) {
-        float known = spread[a] < NEVER_SEEN ? spread[a] : 1;
-        float gray_mixed = printed(of, light[a], 0, share, gray[a]);
-        float mixed = raised(of, gray_mixed);
+        float mixed = raised(of, printed(of, light[a], 0, share, gray[a]));
         density[a] = normal_density_f(logarithm_f(raised(of, gray[a]) / mixed), width[a]);
-        if (of.brightest > 0)
-            density[a] = greater_f(density[a], in_the_dark(of, share, gray_mixed, gray[a],
-                                                           known * raised(of, light[a])));
     }
+    shares_in_the_dark(m, of, share, gray, light, spread, density);
 }
 
 /* The log odds of readings, unless light that nothing predicts is there. */
