@@ -134,6 +134,20 @@ static double light_edges(count c, count m, const float image[c][m], const numbe
    readings count that tell anything. */
 enum { ANYTHING, MARK, SPREAD, WIDTH, KNOWN, LOWER, TOLD, STEPS };
 
+/* Raise the densities of a share of ink to those of bright ink on black ground. */
+static void share_in_the_dark(count m, look of, float share, const float *restrict beside,
+                              const float *restrict here, const float *restrict bare,
+                              const float *restrict marked, const float *restrict bare_here,
+                              const float *restrict marked_here, float *restrict density)
+{
+    for (count a = 0; a < m && of.brightest > 0; a++) {
+        float on_ground = bare[a] + share * (marked[a] - bare[a]);
+        float on_band = bare_here[a] + share * (marked_here[a] - bare_here[a]);
+        float ink = printed(of, beside[a], on_ground, on_band, here[a]);
+        density[a] = greater_f(density[a], in_the_dark(of, share, ink, here[a], of.noise));
+    }
+}
+
 /* Log odds of paper and of ink, against anything, from the steps of ln between the ground beside an
    edge, of which `lower` is the darker one of both, and the band there. Where glare makes the ground
    on both sides white, paper between is white. No array is another one, so that a compiler can take
@@ -178,10 +192,7 @@ static void paper_and_ink(count m, look of, const float *restrict lower, const f
         mean_width[a] = (low + high) / 2;
         paper[a] = counts[a] * log_odds(of, as_paper, of.doubt, anything[a]);
     }
-    for (count a = 0; a < m && of.brightest > 0; a++) {
-        float gray_ink = printed(of, beside[a], marked[a], marked_here[a], here[a]);
-        ink[a] = greater_f(ink[a], in_the_dark(of, 1, gray_ink, here[a], of.noise));
-    }
+    share_in_the_dark(m, of, 1, beside, here, bare, marked, bare_here, marked_here, ink);
     for (count a = 0; a < m; a++)
         ink[a] = counts[a] * log_odds(of, ink[a], of.doubt, anything[a]);
 }
@@ -202,12 +213,7 @@ static void mixed_ink(count m, look of, float share, const float *restrict besid
         float width = sqrtf(of.mark * of.mark + of_share * of_share + known[a]);
         odds[a] = normal_density_f(logarithm_f(raised(of, here[a]) / mixed), width);
     }
-    for (count a = 0; a < m && of.brightest > 0; a++) {
-        float on_ground = bare[a] + share * (marked[a] - bare[a]);
-        float on_band = bare_here[a] + share * (marked_here[a] - bare_here[a]);
-        float mixed = printed(of, beside[a], on_ground, on_band, here[a]);
-        odds[a] = greater_f(odds[a], in_the_dark(of, share, mixed, here[a], of.noise));
-    }
+    share_in_the_dark(m, of, share, beside, here, bare, marked, bare_here, marked_here, odds);
     for (count a = 0; a < m; a++)
         odds[a] = counts[a] * log_odds(of, odds[a], of.at_ends, anything[a]);
 }

@@ -11,9 +11,9 @@
 enum { LEVEL, LIGHT, NOISE, WIDTH, MIXED_WIDTH, COUNTS, ANYTHING, READ };
 
 /* Raise the densities of a share of ink to those of bright ink on black ground. */
-static void shares_in_the_dark(count m, look of, float share, const float *restrict gray,
-                               const float *restrict light, const float *restrict spread,
-                               float *restrict density)
+static void share_in_the_dark(count m, look of, float share, const float *restrict gray,
+                              const float *restrict light, const float *restrict spread,
+                              float *restrict density)
 {
     for (count a = 0; a < m && of.brightest > 0; a++) {
         float known = spread[a] < NEVER_SEEN ? spread[a] : 1;
@@ -51,7 +51,7 @@ static void compare(count m, look of, const numbers *by, float share, const floa
         ink[a] = normal_density_f(away - step, sqrtf(ink_width));
         anything[a] = of.plain * paper[a] + (1 - of.plain) * of.any;
     }
-    shares_in_the_dark(m, of, share, gray, light, spread, ink);
+    share_in_the_dark(m, of, share, gray, light, spread, ink);
 }
 
 /* The density of a share of ink between. */
@@ -63,7 +63,7 @@ static void compare_mixed(count m, look of, float share, const float *restrict g
         float mixed = raised(of, printed(of, light[a], 0, share, gray[a]));
         density[a] = normal_density_f(logarithm_f(raised(of, gray[a]) / mixed), width[a]);
     }
-    shares_in_the_dark(m, of, share, gray, light, spread, density);
+    share_in_the_dark(m, of, share, gray, light, spread, density);
 }
 
 /* The log odds of readings, unless light that nothing predicts is there. */

@@ -70,12 +70,12 @@ static inline float printed(look of, float ground, float of_ground, float share,
 
 static inline float raised(look of, float gray) { return greater_f(gray, 0) + of.offset; }
 
-/* Density of ln of what is seen of a share of bright ink, whose ground is black: an error of that leaves
-   its light open, up to the brightest. */
-static inline float in_the_dark(look of, float share, float ink, float seen, float of_ground)
+/* Density of ln of what is seen of a share of bright ink, whose ground is black: the error of its gray
+   value leaves the light open, up to the brightest. */
+static inline float in_the_dark(look of, float share, float ink, float seen, float ground_error)
 {
     float most = share * of.brightest, mean = lesser_f(ink, most), usual = of.mark * mean;
-    float of_light = lesser_f(share * of_ground * of.ink, most);
+    float of_light = lesser_f(share * ground_error * of.ink, most);
     float error = sqrtf(of_light * of_light + of.noise * of.noise + usual * usual);
     return raised(of, seen) * normal_density_f(seen - mean, error);
 }

@@ -19,27 +19,39 @@ ROWS, COLUMNS = 3, 4
 VELVET, EXPOSURE, SHADOW = 0.002, 0.05, 0.12  # reflectance; shares of the light
 
 
+def sheet(reflectance: float, radius: float) -> tuple[np.ndarray, list[np.ndarray], np.ndarray]:
+    """Return bare ground, its parts for a target each, and the places along one, px."""
+    side = round(PITCH * radius) * FINE
+    ground = np.full((ROWS * side, COLUMNS * side), reflectance)
+    rows = ground.reshape(ROWS, side, COLUMNS, side).swapaxes(1, 2)
+    return (
+        ground,
+        [part for row in rows for part in row],
+        (np.arange(side) + 0.5 - side / 2) / FINE,
+    )
+
+
+def exposed(sheet: np.ndarray) -> np.ndarray:
+    """Return the light that falls on the pixels of a camera."""
+    rows, columns = np.array(sheet.shape) // FINE
+    light = sheet.reshape(rows, FINE, columns, FINE).mean(axis=(1, 3))
+    return cv2.GaussianBlur(light, (0, 0), 0.8)
+
+
 def photograph(
     seed: int, radius: float = RADIUS, strength: float = 0.8, halo: float = 1.2
 ) -> tuple[np.ndarray, list[int]]:
     """Return an image as of a phone, which sharpens, of turned targets, and their IDs."""
     generator, code = np.random.default_rng(seed), family('cct12')
-    pitch = round(PITCH * radius)
-    image = np.full((ROWS * pitch * FINE, COLUMNS * pitch * FINE), WHITE)
-    numbers = generator.choice(len(code.words), ROWS * COLUMNS, replace=False)
-    across = (np.arange(pitch * FINE) + 0.5) / FINE - pitch / 2
-    for place, number in enumerate(numbers):
-        row, column = divmod(place, COLUMNS)
+    paper, parts, across = sheet(WHITE, radius)
+    numbers = generator.choice(len(code.words), len(parts), replace=False)
+    for part, number in zip(parts, numbers, strict=True):
         turn, (right, down) = generator.uniform(0, 2 * np.pi), generator.uniform(-2, 2, 2)
         x, y = np.meshgrid((across - right) / radius, (across - down) / radius)
         x, y = x * np.cos(turn) - y * np.sin(turn), x * np.sin(turn) + y * np.cos(turn)
         dark = np.maximum(np.abs(x), np.abs(y)) < SQUARE * code.band[1]
-        where = np.s_[row * pitch * FINE :, column * pitch * FINE :]
-        part = image[where][: pitch * FINE, : pitch * FINE]
         part[dark & ~inked(x, y, code.words[number], code)] = BLACK
-    light = image.reshape(ROWS * pitch, FINE, COLUMNS * pitch, FINE).mean(axis=(1, 3))
-    light = cv2.GaussianBlur(light, (0, 0), 0.8)
-    gray = 255 * light ** (1 / 2.2)
+    gray = 255 * exposed(paper) ** (1 / 2.2)
     gray += strength * (gray - cv2.GaussianBlur(gray, (0, 0), halo))
     gray += generator.normal(0, 1.5, gray.shape)
     shown = sorted(code.numbers[of] for of in numbers)
@@ -49,21 +61,15 @@ def photograph(
 def at_night(seed: int, radius: float = 5.0) -> tuple[np.ndarray, list[int]]:
     """Return a dark, noisy image of targets on black, each partly in shadow, and their IDs."""
     generator, code = np.random.default_rng(seed), family('aicon14')
-    pitch = round(PITCH * radius)
-    light = np.full((ROWS * pitch * FINE, COLUMNS * pitch * FINE), VELVET)
-    numbers = generator.choice(len(code.words), ROWS * COLUMNS, replace=False)
-    across = ((np.arange(pitch * FINE) + 0.5) / FINE - pitch / 2) / radius
-    x, y = np.meshgrid(across, across)
-    for place, number in enumerate(numbers):
-        row, column = divmod(place, COLUMNS)
+    velvet, parts, across = sheet(VELVET, radius)
+    numbers = generator.choice(len(code.words), len(parts), replace=False)
+    x, y = np.meshgrid(across / radius, across / radius)
+    for part, number in zip(parts, numbers, strict=True):
         turn, shade = generator.uniform(0, 2 * np.pi, 2)
         turned = x * np.cos(turn) - y * np.sin(turn), x * np.sin(turn) + y * np.cos(turn)
-        where = np.s_[row * pitch * FINE :, column * pitch * FINE :]
-        part = light[where][: pitch * FINE, : pitch * FINE]
         part[inked(*turned, code.words[number], code)] = WHITE
         part[x * np.cos(shade) + y * np.sin(shade) > 1] *= SHADOW
-    light = light.reshape(ROWS * pitch, FINE, COLUMNS * pitch, FINE).mean(axis=(1, 3))
-    gray = 255 * (EXPOSURE * cv2.GaussianBlur(light, (0, 0), 0.8)) ** (1 / 2.2)
+    gray = 255 * (EXPOSURE * exposed(velvet)) ** (1 / 2.2)
     gray += generator.normal(0, 4, gray.shape)
     shown = sorted(code.numbers[of] for of in numbers)
     return np.clip(np.rint(gray), 0, 255).astype(np.uint8), shown

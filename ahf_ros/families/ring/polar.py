@@ -194,7 +194,6 @@ def polar_images(
     radii = np.linspace(INNERMOST, outermost, circles)
     ratio = lift_ratio(gray, dots, band) if ratio is None else ratio
     contrast, lift = _appearance(gray, dots, band, ratio)
-    bright = dots.polarity < 0
     values, reach = on_circles(gray, dots.frames, angles_of(count), radii, lift)
     ground = values[:, [np.abs(radii - place).argmin() for place in _on_ground(band)]]
     apart = 2 * np.pi * inner * dots.size / count
@@ -215,7 +214,7 @@ def polar_images(
         plate=np.full((len(values), count), np.inf),
         shade=shade,
         glare=glare,
-        brightest=np.where(bright & np.equal(ratio, AS_IT_IS), dots.bright, 0.0),
+        brightest=np.where((dots.polarity < 0) & np.equal(ratio, AS_IT_IS), dots.bright, 0.0),
     )
 
 
