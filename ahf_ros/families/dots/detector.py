@@ -17,7 +17,14 @@ from ahf_ros.base.target import DottedTarget, Target, sorted_targets
 from ahf_ros.families.contract import DetectorSettings, moved_targets
 from ahf_ros.families.dots.calibration import stated
 from ahf_ros.families.dots.discs import judged, small_discs, voted_discs, whole_discs
-from ahf_ros.families.dots.rings import CERTAIN, Rings, fit_targets, likely_targets, read_discs
+from ahf_ros.families.dots.rings import (
+    CERTAIN,
+    PLAUSIBLE,
+    Rings,
+    fit_targets,
+    likely_targets,
+    read_discs,
+)
 from ahf_ros.families.pyramid_detector import PyramidDetector
 from ahf_ros.prints.dots import DotRingPrint
 from ahf_ros.vision.ellipse_targets import ellipse_fields, frames_of, stayed
@@ -25,8 +32,6 @@ from ahf_ros.vision.frame import affine_frames, ellipse_axes
 from ahf_ros.vision.image import as_gray, check_image
 from ahf_ros.vision.large_targets import targets_of_octaves
 from ahf_ros.vision.pyramid import ImagePyramid, Octave
-
-_PLAUSIBLE = 0.5  # share of the edges of disc and border
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,7 +68,7 @@ class DotsDetector(PyramidDetector):
         polarity = np.array([target.polarity for target in dotted])
         gray = as_gray(image).astype(np.float32, copy=False)
         fit = fit_targets(gray, start, polarity, self.design)
-        good = (fit.share >= _PLAUSIBLE) & stayed(fit.frames, start)
+        good = (fit.share >= PLAUSIBLE) & stayed(fit.frames, start)
         changes = fit.frames @ np.linalg.inv(start)
         places = [
             {**place, 'dots': _moved(target, change)}

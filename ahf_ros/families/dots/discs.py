@@ -28,16 +28,14 @@ from ahf_ros.vision.small_dots import BLURRED, LARGEST, small_dots
 _STRAIGHT = 8.0  # length of an edge that is no small dot's, px of the image at half its size
 _TILE = 64  # side, px of the image at half its size
 _MINIMUM_EDGES = 20  # of four tiles, px; disc and border of the smallest target have twice as many
-_MAXIMUM_SHARE = 0.7  # share of the image, beyond which all of it is one region
 
 _SCALES = np.geomspace(0.76, 1.32, 11)  # of the radius of a disc, in radii of its candidate
 _MINIMUM_SHARE = 0.55  # of the steps of ln at disc and border; lattices of light reach 0.54
 _MARGIN = 0.3  # about the border of a known target, disc radii
-_TOLERANCE = 0.9  # the same, of a disc whose border has a whole outline
 
 _RAYS = 20
 _ANGLES = 2 * np.pi * np.arange(_RAYS) / _RAYS
-_MINIMUM_STEP = 0.12  # step of ln of a disc
+MINIMUM_STEP = 0.12  # step of ln of a disc
 _EDGE_SIDES = 5  # radii between which the edges lie
 _PART = 500_000  # samples at a time, which bounds the memory
 
@@ -58,8 +56,6 @@ def open_regions(edges: LogEdges, outlines: np.ndarray) -> list[tuple[slice, sli
     wide = cv2.dilate((of_four >= _MINIMUM_EDGES).astype(np.uint8), np.ones((3, 3), np.uint8))
     contours, _ = cv2.findContours(wide, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
     boxes = [cv2.boundingRect(contour) for contour in contours]
-    if sum(across * tall for _, _, across, tall in boxes) > _MAXIMUM_SHARE * rows * columns:
-        return [(slice(0, height), slice(0, width))]
     return [
         (
             slice(_TILE * top, min(_TILE * (top + tall), height)),
@@ -83,7 +79,7 @@ def whole_discs(
         found.append(replace(circles, frames=frames, polarity=side * circles.polarity))
     dots = Dots.joined(found)
     major = ellipse_axes(dots.frames)[0]
-    of_size = (major >= _TOLERANCE * low) & (major <= high / _TOLERANCE)
+    of_size = (major * _SCALES[-1] >= low) & (major * _SCALES[0] <= high)
     return dots.select(of_size & np.isin(dots.polarity, settings.polarities))
 
 
@@ -198,6 +194,6 @@ def _mean_steps(values: np.ndarray, polarity: np.ndarray, count: int) -> np.ndar
     steps = values[..., [1, 2, 4]] - values[..., [0, 3, 3]]
     steps *= (polarity / LOG_SCALE)[:, None, None, None]
     usual = medians(steps[..., 0].swapaxes(1, 2).reshape(-1, _RAYS)).reshape(-1, count)
-    usual = np.maximum(usual, _MINIMUM_STEP)
+    usual = np.maximum(usual, MINIMUM_STEP)
     means: np.ndarray = np.clip(steps / usual[:, None, :, None], -1, 1).mean(axis=(1, 3))
     return means.astype(np.float64)

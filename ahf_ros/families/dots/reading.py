@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ahf_ros.families.dots.discs import border_steps
+from ahf_ros.families.dots.discs import MINIMUM_STEP, border_steps
 from ahf_ros.families.words import UNEXPECTED
 from ahf_ros.prints.cyclic import mirrored_words, rotated_words
 from ahf_ros.prints.dots import DotRingPrint
@@ -16,15 +16,10 @@ from ahf_ros.vision.dot_evidence import PIXELS_ASIDE, circle_sides, dot_evidence
 from ahf_ros.vision.homography import local_frames
 
 _PHASES = 12  # of the ring, in the angle from one place to the next
-_SHRUNK = np.array([0.5, 0.63, 0.8, 1.0])  # radii that small dots may have, in the printed one
-_GROWN = np.array([1.2, 1.45])  # the same, as far as there is room for them
-_FULLEST = 0.9  # share of this room
-_SPREAD = (0.7, 0.45)  # standard deviation of their ln below and above, as blur looks like growth
+_RADII = np.array([0.5, 0.63, 0.8, 1.0, 1.2, 1.45])  # that small dots may have, in the printed one
+_SPREAD = 0.5  # standard deviation of their ln
+_FAINTEST = 0.6  # step of a dot, in the one that the blur leaves it
 _LIMIT = 12.0  # evidence that one place may give
-_MINIMUM_STEP = 0.12  # step of ln of a disc
-_MINIMUM_SHARE = 0.6  # step of a dot, in the one that the blur leaves it
-_MAXIMUM_SHARE = 1.1  # step of a dot, in steps of the disc
-_ASIDE = 1.2  # distance of samples from the edges of dots, blurs
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,13 +60,13 @@ def read_rings(log: np.ndarray, fit: Fit, code: DotRingPrint) -> Readings:
     """Read the rings of fitted discs and borders; `log` is LOG_SCALE ln(I + 8), int16."""
     count, bits, polarity = len(fit.frames), code.bits, fit.polarity
     disc = np.diff(circle_sides(log, fit.frames)[0])[..., 0]
-    usual = np.maximum(np.median(disc * polarity[:, None], axis=1), _MINIMUM_STEP)
+    usual = np.maximum(np.median(disc * polarity[:, None], axis=1), MINIMUM_STEP)
     phases = 2 * np.pi / bits * np.arange(_PHASES) / _PHASES
     points = dot_points((phases[:, None] - 2 * np.pi * np.arange(bits) / bits).ravel(), code)
-    aside = np.repeat(np.maximum(PIXELS_ASIDE, _ASIDE * fit.blur), _PHASES * bits)
+    aside = np.repeat(np.maximum(PIXELS_ASIDE, fit.blur), _PHASES * bits)
     room = min(code.dot_circle - 1, code.ground_radius - code.dot_circle)
-    widest = _FULLEST * min(room, code.dot_circle * np.sin(np.pi / bits))
-    radii = np.append(code.dot_radius * _SHRUNK, np.minimum(code.dot_radius * _GROWN, widest))
+    widest = min(room, code.dot_circle * np.sin(np.pi / bits))
+    radii = np.minimum(code.dot_radius * _RADII, widest)
     shape = (len(radii), count, _PHASES, bits)
     small = np.stack([local_frames(fit.frames, points, np.full(len(points), r)) for r in radii])
     single = small.reshape(len(radii), -1, 3, 3)
@@ -84,16 +79,14 @@ def read_rings(log: np.ndarray, fit: Fit, code: DotRingPrint) -> Readings:
     # The right radius is the one that sees most of the dots, at the right phase.
     middle = np.median(steps, axis=4)
     seen = np.maximum(middle, 0).sum(axis=3).max(axis=2).T
-    change = np.log(radii / code.dot_radius)
-    usual = np.exp(-0.5 * (change / np.where(change < 0, *_SPREAD)) ** 2)
+    usual = np.exp(-0.5 * (np.log(radii / code.dot_radius) / _SPREAD) ** 2)
     own, every = (seen * usual).argmax(axis=1), np.arange(count)
     # Dots are fainter than the disc where they are small, all of them alike.
     steps, small, middle = steps[own, every], small[own, every], middle[own, every]
     size = np.sqrt(np.abs(np.linalg.det(small[:, 0, 0, :2, :2])))
     faintest = 1 - np.exp(-0.5 * (size / fit.blur) ** 2)
     highest = middle.max(axis=(1, 2))
-    height = np.clip(highest, _MINIMUM_SHARE * faintest, _MAXIMUM_SHARE)
-    steps /= height[:, None, None, None]
+    steps /= np.maximum(highest, _FAINTEST * faintest)[:, None, None, None]
     evidence = dot_evidence(steps, small)
     # Between the places nothing is seen; the right phase is the one that sees most of the dots.
     best = np.maximum(evidence, 0).sum(axis=2).argmax(axis=1)

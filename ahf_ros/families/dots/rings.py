@@ -34,15 +34,12 @@ _RAYS = 40  # round each circle
 _REACH = 0.3  # how far from a circle its edge is looked for, radii of the disc: half the border
 _MINIMUM_REACH = 1.35  # the same of small discs, px: what a profile needs
 
+PLAUSIBLE = 0.4  # share of the edges of disc and border that are seen
 CERTAIN = 0.95  # confidence from which a target is reported
 WEIGHTS = Path(__file__).with_name('fitted_weights.json')
 
 _PART = 512  # discs fitted at a time, which bounds the memory
-_PLAUSIBLE = 0.4  # share of the edges of disc and border, for the ring to be read
-_MISSING = 0.1  # share of the steps that are missing where there are edges, beyond the blur's
-_OF_BLUR = 2.0  # share of the steps that blur hides, in its radii of the disc
 _BETWEEN = 2.0  # evidence for a dot halfway between places, where targets have none
-_MAXIMUM_CONTRAST = 0.85  # contrast of a disc, dark over bright
 
 _MAXIMUM_SHARE = 0.85
 # Of the steps at disc and border, and of their edges, for a target in good light.
@@ -186,11 +183,9 @@ def _read_part(
     pyramid: ImagePyramid, discs: Dots, code: DotRingPrint, expected: frozenset[int]
 ) -> Rings:
     fit = fit_targets(pyramid.gray, discs.frames, discs.polarity, code)
-    fit = fit.select((fit.share >= _PLAUSIBLE) & (fit.contrast <= _MAXIMUM_CONTRAST))
+    fit = fit.select(fit.share >= PLAUSIBLE)
     readings = read_rings(pyramid.logs[0], fit, code)
-    # Circles of other radii can have their edges within reach, but not the steps.
-    missing = fit.share - readings.seen - _OF_BLUR * fit.blur / fit.size
-    likely = (missing <= _MISSING) & (readings.between <= _BETWEEN) & readings.inside
+    likely = readings.inside & (readings.between <= _BETWEEN)
     fit, readings = fit.select(likely), readings.select(likely)
     if expected:
         readings = expecting(readings, code, expected)
