@@ -55,8 +55,7 @@ from ahf_ros.vision.large_targets import targets_of_octaves
 from ahf_ros.vision.pyramid import ImagePyramid, Octave
 from ahf_ros.vision.small_dots import small_dots_in
 
-_MARGIN = 0.5  # about the dots of certain targets, dot radii
-_WHOLE_MARGIN = 0.4  # about a dot whose outline is whole, dot radii
+_MARGIN = 0.4  # about dots of certain targets and dots whose outline is whole, dot radii
 _PROMISING = 0.85  # support of a hypothesis with another code than before, to be placed again
 _MAXIMUM_GROWTH = 1.0  # of ink, beyond which dots are printed with another radius, px
 
@@ -151,7 +150,7 @@ def _with_others(
     pyramid: ImagePyramid, whole: Dots, settings: DetectorSettings, explained: list[np.ndarray]
 ) -> Dots:
     """Return dots with a whole outline, and those without one outside of explained outlines."""
-    outlines = frame.circle_outlines(whole.frames, np.full(len(whole.frames), 1 + _WHOLE_MARGIN))
+    outlines = frame.circle_outlines(whole.frames, np.full(len(whole.frames), 1 + _MARGIN))
     kind = (*settings.radii, settings.polarities)
     voted = voted_dots(pyramid, *kind, explained=[*outlines, *explained])
     return distinct(Dots.joined([whole, voted, small_dots_in(pyramid, *kind, explained)]))

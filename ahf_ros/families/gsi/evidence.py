@@ -23,7 +23,6 @@ from ahf_ros.vision.logarithm import LOG_OFFSET
 from ahf_ros.vision.robust import median
 
 _MINIMUM_STEP = 0.12  # step of ln of a dot
-_MINIMUM_DARK_STEP = 0.02  # the same where there is hardly any light
 _NOISE = 0.08  # of a step of ln, standard deviation
 _BIN = 0.06  # of ln(I + 8), of the levels of ink and paper
 _BINS = int(np.ceil(np.log((255 + LOG_OFFSET) / LOG_OFFSET) / _BIN)) + 1
@@ -37,7 +36,6 @@ _SMOOTHING = np.exp(-0.5 * (_DISTANCE / _SPREAD) ** 2)
 _SMOOTHING /= _SMOOTHING.sum(axis=1, keepdims=True)
 _CONTRADICTED = -6.0  # evidence at a place of a template dot that nearly rules one out
 _AT_ONCE = 14  # positions that are looked at at a time
-_ROUNDING = 1e-9  # of supports
 _HIDDEN = 1  # dots that are found and nevertheless so contradicted, in deep shadow
 
 _MAXIMUM_FOR, _MAXIMUM_AGAINST = 8.0, 6.0  # that one place may say on whether there is a target
@@ -147,7 +145,7 @@ def likely_templates(
     seen = seen.select(which)
     while seen.ratio.shape[1] < len(family.places):
         seen = seen.further(log, family, _AT_ONCE)
-        likely = np.flatnonzero(_most_support(seen, family) >= least - _ROUNDING)
+        likely = np.flatnonzero(_most_support(seen, family) >= least)
         which, seen = which[likely], seen.select(likely)
     return templates.select(which), seen.evidence
 
@@ -200,9 +198,8 @@ def _of_steps(
 
     Steps are expected in the light that falls on each ray.
     """
-    brighter = _gray(sides.max(axis=3))
+    brighter = np.maximum(_gray(sides.max(axis=3)), 1.0)
     expected = np.log((brighter + LOG_OFFSET) / (ink[:, None, None] * brighter + LOG_OFFSET))
-    expected = np.maximum(expected, _MINIMUM_DARK_STEP)
     steps = (sides[..., 1] - sides[..., 0]) * polarity[:, None, None]
     return dot_evidence(steps / expected, frames, _NOISE / expected)
 

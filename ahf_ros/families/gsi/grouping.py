@@ -42,12 +42,9 @@ _CROWD = (4.0, 1.25)
 _LENGTH_ERROR = (0.35, 0.7)  # of a distance in units of an ellipse: share of it, and dot radii
 _LENGTH_ERROR_OF_MANY = (0.25, 0.5)  # the same, where there are many dots
 _ELLIPSE_ERROR = 0.25  # of the axes of a dot, from those that three dots imply, in ln
-_ELLIPSE_PIXELS = 1.2  # added to it, px over the semi-minor axis: blobs consist of whole pixels
 _PREDICTED = 0.9  # error of a dot that is predicted by three others, printed dot radii
 _PERSPECTIVE = 0.06  # the same, in its distance from them
 _RESIDUAL = 0.35  # of the dots of a template about a homography, root mean square, printed radii
-_PIXELS = 0.35  # the same, px, which counts where dots are small
-_WELL = 0.25  # share of what is accepted, of a template that fits well
 _MAXIMUM_GROUPS = 2000  # of one part, for a homography to be fitted
 _MAXIMUM_TEMPLATES = 2000  # of one polarity, those that fit best
 _STRAY = 4  # dots at the positions of a target that do not belong to it
@@ -330,7 +327,7 @@ def _triples_among(dots: Dots, pairs: Pairs) -> Triples:
         kernels.likely_triples,
         *(np.stack([pairs.first, pairs.second], axis=1), pairs.offset.view(float).reshape(-1, 2)),
         *(ellipses @ np.diag([1.0, -1.0]), frame.inverses(ellipses)),
-        _ELLIPSE_ERROR + _ELLIPSE_PIXELS / minor,
+        _ELLIPSE_ERROR + 1 / minor,  # blobs consist of whole pixels
     )
 
 
@@ -358,7 +355,7 @@ def _fitted(dots: Dots, members: np.ndarray, family: PointPrint) -> Templates:
     squares = ((expected - images) ** 2).sum(axis=2)
     implied = local_frames(fit.homographies, places, family.template_radii).reshape(-1, 3, 3)
     minor = frame.ellipse_axes(implied)[1].reshape(members.shape)
-    allowed = np.maximum(_RESIDUAL * minor, _PIXELS)
+    allowed = _RESIDUAL * np.maximum(minor, 1.0)
     relative = np.where(there, squares / allowed**2, 1.0)
     misfit = np.sqrt(relative.mean(axis=1))
     good = (misfit < 1) & (np.linalg.det(fit.homographies) < 0)  # y is up, then down
@@ -390,14 +387,14 @@ def _best(templates: Templates) -> Templates:
 
 
 def _parts_of_others(templates: Templates) -> np.ndarray:
-    """Return where all dots of a template that lacks one belong to one that fits well.
+    """Return where all dots of a template that lacks one belong to one that fits.
 
     Four dots of GSI's template are the corners of a square, which fits in four ways.
     """
     members = np.sort(templates.members, axis=1)
     count = members.shape[1]
     lacking = np.flatnonzero(members[:, 0] < 0)
-    whole = members[(members[:, 0] >= 0) & (templates.misfit < _WELL)]
+    whole = members[members[:, 0] >= 0]
     parts = [np.delete(whole, index, axis=1) for index in range(count)]
     rows = np.concatenate([members[lacking, 1:], *parts])
     _, same = np.unique(rows, axis=0, return_inverse=True)
