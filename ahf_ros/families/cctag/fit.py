@@ -29,21 +29,21 @@ from ahf_ros.vision.robust import NORMAL
 
 _ENOUGH = 4  # targets, and edges of light, that tell what is usual
 _SHOWN = 0.3  # ln of the height of an edge of light that tells
-_MOST_OF_FRAME, _MOST = 0.08, 0.3  # changes at once
+_MOST = 0.3  # change at once
 _NEAR = 0.3, 0.3, 0.4, 1.0, 0.3  # deviations of an edge of light from where it was
 _PRIOR = Prior()
 _VALUES = _PRIOR.shift, math.log(_PRIOR.blur), 0.0, 0.0, 0.0  # of `Usual`, as the next
 _DEVIATIONS = *_PRIOR.deviations[:2], 10.0, 10.0, 10.0
 _LEAST = 0.01, 0.01, 0.005, 0.002, 0.03
 _HARDLY = 1e-6  # weight of what nothing tells of
-_LEAST_VARIANCE, _LEAST_SPREAD = 0.003, 0.05  # of gray values
+_LEAST_SPREAD = 0.05  # of gray values
 _GROUPS = 8  # of pixels of like gray values
 _OF_MEDIAN = 0.4549  # median of the square of a normal error
 _OUTLIERS = 16.0, *([6.0] * 11)  # deviations that quarter a weight, in rounds
 _FREE = 10  # pixels more than parameters, at the least
 _TRIALS = 4
 _DAMPING = 1e-3, 1e-4  # at first, and at least
-_CHANGING, _CHANGING_LIGHT = 0.02, 0.05  # the same, and of edges of light, px and radii
+_CHANGING = 0.02  # the same, and of edges of light, px and radii
 _STAYING, _BY_PLACE = 1e-3, 10.0  # move of a centre, px, and of edges by that
 _OF_VARIANCE = 1.4  # of gray values, that their model adds
 _DIFFERENT = 2.0  # deviations of a print that counts as one
@@ -148,10 +148,10 @@ def fitted(patch: Patch, formed: Formed, usual: Usual, most: float = math.inf) -
     parameters = EDGES + formed.edges.size
     place, values, shown, covariance, cost, *_ = kernels.cctag_fit(
         *(patch.seen, *patch.formed(formed), *patch.bounds(len(formed.edges))),
-        *(_MOST_OF_FRAME, _MOST, OF_INTERPOLATION, usual.values, usual.deviations, _NEAR),
+        *(_MOST, _MOST, OF_INTERPOLATION, usual.values, usual.deviations, _NEAR),
         *(usual_perspective(formed.frame[None])[0], _HARDLY, usual.noise, _OUTLIERS),
         *(NORMAL, _LEAST_SPREAD, _FREE, _TRIALS, *_DAMPING, _STAYING, _BY_PLACE),
-        *(_CHANGING, _CHANGING_LIGHT, _DIFFERENT, _MOST_SQUARED, most),
+        *(_CHANGING, _CHANGING, _DIFFERENT, _MOST_SQUARED, most),
     )
     place = frame.translated(place[None], *patch.corner)[0]
     covariance = covariance[:parameters, :parameters]
@@ -167,4 +167,4 @@ def _noise(fits: list[Fit]) -> tuple[float, float]:
     means = [float(shown[of].mean()) for of in groups]
     variances = [float(np.median(squares[of])) / _OF_MEDIAN for of in groups]
     slope, black = np.polyfit(means, variances, 1).tolist()
-    return max(black, _LEAST_VARIANCE), max(slope, 0.0)
+    return max(black, _LEAST_SPREAD**2), max(slope, 0.0)

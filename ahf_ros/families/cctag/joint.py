@@ -30,14 +30,11 @@ from ahf_ros.vision.image import GAMMA, as_light
 
 _LARGEST = 32.0  # px: rays place the rings of larger targets as well, and much faster
 _TELLING = 12  # targets that tell what is usual
-_LARGER = 0.9  # quantile of errors that tell which model is right
 _FEWEST = 60  # pixels that are fitted
 _UNUSUAL = 2.0  # deviations of a misfit, from which other light and other IDs are tried
 _MOST_UNUSUAL = 5.0  # the same, up to which the place is that of the rings
-_HOPELESS = 12.0  # the same, from which no ID is tried
 _CERTAIN, _ENOUGH = 0.98, 4  # confidence of targets that tell of doubtful ones, and their number
-_PROBABLE = 0.75  # probability of a target, from which it is placed
-_POSSIBLE, _MOST = 0.05, 128  # the same, from which it is read again, and number of these
+_POSSIBLE = 0.05  # probability of a target, from which it is placed
 _RIVALS = 6  # IDs that rays may show
 _ODDS, _LESS = 6.0, 2.0  # ln of the odds of a target that is usual, less by each deviation
 _BEYOND_DOUBT = 200.0  # cost more than the likeliest ID's, of one that is not fitted to the end
@@ -70,11 +67,9 @@ def contested(
     targets, which tell how well rings are seen in this image.
     """
     enough = (_small(rings) & (rings.confidence >= _CERTAIN)).sum() >= _ENOUGH
-    least = _POSSIBLE if enough else _PROBABLE
-    which = np.flatnonzero(_small(rings) & (rings.of_target >= least))
+    which = np.flatnonzero(_small(rings) & (rings.of_target >= _POSSIBLE))
     if not len(which):
         return rings
-    which = which[np.argsort(-rings.of_target[which], kind='stable')[:_MOST]]
     own = rings.select(which)
     certain = own.confidence >= _CERTAIN
     telling = np.flatnonzero(certain | np.logical_not(enough))
@@ -83,8 +78,7 @@ def contested(
         reading = own.select(slice(row, row + 1))
         unusual = scene.usual.unusual(fit)
         if enough and not (certain[row] and unusual <= _UNUSUAL):
-            doubt = unusual > _UNUSUAL or reading.of_id[0] < _CERTAIN
-            if doubt and unusual < _HOPELESS:
+            if unusual > _UNUSUAL or reading.of_id[0] < _CERTAIN:
                 reading, fit = scene.likeliest(reading, polarity, fit)
             reading = replace(reading, by_pixels=scene.odds(fit))
         rings = rings.replaced(which[row : row + 1], scene.placed(reading, fit))
@@ -227,4 +221,4 @@ class _Scene:
         errors = np.abs(np.concatenate([of.errors for of in fits.values()]))
         begun = {int(rows[row]): fit for row, fit in fits.items()}
         scene = replace(scene, usual=usual.after(list(fits.values())), begun=begun)
-        return scene, float(np.quantile(errors, _LARGER))
+        return scene, float(np.median(errors))
