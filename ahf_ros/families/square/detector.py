@@ -39,7 +39,6 @@ _DRAFT_DEVIATION = 0.028
 _SMALL = 45.0  # diagonal of a marker whose cells are not much larger than pixels, px
 _SMALLEST_HALF = 24  # smaller side of a half that markers are looked for in, px
 _SAME_PLACE = 0.3  # distance of two readings of one marker, in sides
-_MANY = 1 << 32  # more than any dictionary has markers
 _SURE = 7.0  # logarithmic odds of a marker that is looked for in no half: a thousand to one
 _FITTED = 4.0  # logarithmic odds against a marker whose print was laid: half its eight unknowns
 _SEVERAL = 4.0  # power of their number, one in which each of several groups is there
@@ -295,7 +294,8 @@ def _of_usual_borders(readings: Readings) -> Readings:
 
 def _owning(readings: Readings, *, of_print: bool = False) -> np.ndarray:
     """Return which readings, the best first, are the first in a place, or of a print there."""
-    kinds = of_print * (readings.group * _MANY + readings.number)
+    count = readings.number.max(initial=0) + 1
+    kinds = of_print * (count * readings.group + readings.number)
     owning: np.ndarray = kernels.place_owners(*_places_of(readings.corners), kinds, len(kinds))
     return owning
 

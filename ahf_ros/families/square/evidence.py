@@ -18,6 +18,12 @@ class Evidence:
     whole: np.ndarray  # (k,), whether the border is whole, bool
 
 
+MINIMUM_STEP = 0.35
+"""From ink to paper, in the logarithm."""
+
+SIDE = 0.6
+"""Minimum share of such steps of each side of the border."""
+
 BORDER_WEIGHT = 0.3
 """Of the border, which is alike in other quadrilaterals, too."""
 

@@ -15,7 +15,9 @@ from ahf_ros.families.square.evidence import (
     BORDER_WEIGHT,
     CORNER,
     COVERED,
+    MINIMUM_STEP,
     SHARPNESS,
+    SIDE,
     USUAL_BLUR,
     Evidence,
 )
@@ -31,9 +33,7 @@ _UNUSUAL = 3.0  # log odds against light that spreads over ink, or changes withi
 _MOST_MIXED = 0.2  # share that a cell takes from each neighbour, at most
 _REACH = 0.25  # standard deviation of the window that levels are taken from, in sides
 _EVERYWHERE = 1e-6  # weight of all others, if there is none in this window
-_MINIMUM_STEP = 0.35  # from ink to paper, in the logarithm
 _OF_USUAL = 0.4  # minimum of a step of the border, in usual ones
-_SIDE = 0.6  # minimum share of such steps of each side of the border
 _UNCLEAR = 1.5  # logarithmic odds against a cell that is between ink and paper
 _PART_WEIGHT = 0.15  # of each part of a cell, which have one colour in other quadrilaterals, too
 _CORNER_WEIGHT = 0.7
@@ -60,7 +60,7 @@ def levels_of_cells(
     counts = len(every), len(small)
     blurs, spread = np.repeat(_BLURS, counts), np.repeat([True, False], counts)
     reach = (np.arange(side + 2) / (_REACH * (side + 2))) ** 2
-    of_levels = LOG_OFFSET, _MOST_MIXED, _MINIMUM_STEP, _OF_USUAL, _SIDE, _EVERYWHERE
+    of_levels = LOG_OFFSET, _MOST_MIXED, MINIMUM_STEP, _OF_USUAL, SIDE, _EVERYWHERE
     weights = np.array([_PART_WEIGHT, BORDER_WEIGHT, _CORNER_WEIGHT])
     seen, paper, (ink, square, around), *_ = kernels.cell_evidence(
         gray,

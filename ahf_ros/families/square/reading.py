@@ -21,7 +21,7 @@ import cv2
 import numpy as np
 
 from ahf_ros import kernels
-from ahf_ros.families.square.evidence import Evidence
+from ahf_ros.families.square.evidence import MINIMUM_STEP, SIDE, Evidence
 from ahf_ros.families.square.frames import square_frames
 from ahf_ros.families.square.levels import levels_of_cells
 from ahf_ros.families.square.shapes import parallel_odds
@@ -32,8 +32,6 @@ from ahf_ros.vision.array_record import ArrayRecord
 from ahf_ros.vision.logarithm import LOG_OFFSET
 
 _SMALLEST_CELL = 1.0  # that can be read, px
-_MINIMUM_STEP = 0.35  # from ink to paper, in the logarithm
-_SIDE = 0.6  # minimum share of such steps of each side of the border
 _POINTS, _DEPTH = 10, 0.06  # of each side where a border is looked for, distance in sides
 _DOUBT = 6.0  # logarithmic odds against a marker that nothing but a quadrilateral speaks for
 _FIGURES = 7.0  # logarithmic odds of letters and the like against markers
@@ -203,6 +201,6 @@ def _dark_inside(gray: np.ndarray, frames: np.ndarray, depth: float) -> np.ndarr
     The depth inside is a share of a side.
     """
     places = np.linspace(-0.45, 0.45, _POINTS), 0.5 + _DEPTH, 0.5 - depth
-    numbers = LOG_OFFSET, exp(_MINIMUM_STEP / 2), _SIDE
+    numbers = LOG_OFFSET, exp(MINIMUM_STEP / 2), SIDE
     dark: np.ndarray = kernels.dark_inside(gray, frames, *places, *numbers)
     return dark

@@ -19,6 +19,7 @@ from ahf_ros.families.square.evidence import (
     BORDER_WEIGHT,
     CORNER,
     COVERED,
+    MINIMUM_STEP,
     SHARPNESS,
     USUAL_BLUR,
     Evidence,
@@ -28,7 +29,6 @@ from ahf_ros.families.square.frames import cell_sizes
 _ALONG = np.linspace(-0.32, 0.32, 5)  # where steps are taken, from the middle of a line, cells
 _ASIDE = 0.3  # on either side of it, cells
 _OFFSET = 2.0  # added to gray values before the logarithm, about the noise of dark ones
-_MINIMUM_STEP = 0.35  # from ink to paper, in the logarithm
 # Of steps of the print, in usual ones, and what blur adds where all light is of other cells.
 _DEVIATION = np.array([0.25, 0.5])
 _STRAY = 0.05  # density of steps that light makes, in that of the likeliest ones
@@ -53,7 +53,7 @@ def steps_between_cells(
         _ALONG,
         _ASIDE,
         _OFFSET,
-        _MINIMUM_STEP,
+        MINIMUM_STEP,
         _DEVIATION,
         _STRAY,
         _WEIGHT,
