@@ -47,7 +47,6 @@ _PERSPECTIVE = 0.06  # the same, in its distance from them
 _RESIDUAL = 0.35  # of the dots of a template about a homography, root mean square, printed radii
 _MAXIMUM_GROUPS = 2000  # of one part, for a homography to be fitted
 _MAXIMUM_TEMPLATES = 2000  # of one polarity, those that fit best
-_STRAY = 4  # dots at the positions of a target that do not belong to it
 _CELL = 2.0  # smallest one of the map of the nearest dots, px
 
 
@@ -245,8 +244,7 @@ def find_templates(dots: Dots, family: PointPrint, *, obvious: bool = False) -> 
     groups = np.unique(np.concatenate(members), axis=0)
     if not len(groups):
         return nothing
-    templates = _fitted(dots, groups, family)
-    return _best(templates.select(_mostly_empty(templates, nearest(), family)))
+    return _best(_fitted(dots, groups, family))
 
 
 def _triples(places: np.ndarray, reference: int, thorough: bool) -> list[tuple[int, int, int]]:
@@ -367,17 +365,6 @@ def _fitted(dots: Dots, members: np.ndarray, family: PointPrint) -> Templates:
     return Templates(
         homographies=fit.homographies, members=members, polarity=signs, scale=scale, misfit=misfit
     ).select(good)
-
-
-def _mostly_empty(templates: Templates, nearest: Nearest, family: PointPrint) -> np.ndarray:
-    """Return where not many more positions than those of a code have a dot nearby."""
-    count = len(family.template)
-    frames = local_frames(templates.homographies, family.places[count:], family.radii[count:])
-    single = frames.reshape(-1, 3, 3)
-    found, _ = nearest(single[:, :2, 2], frame.inverses(single[:, :2, :2]), 1.0)
-    found = np.sort(found.reshape(frames.shape[:2]), axis=1)
-    different = (np.diff(found, axis=1, prepend=-1) > 0).sum(axis=1)
-    return different <= family.rule.dots + _STRAY
 
 
 def _best(templates: Templates) -> Templates:

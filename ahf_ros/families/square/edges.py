@@ -40,7 +40,6 @@ _MEASUREMENTS = 5
 _WIDE = 2  # of these, with profiles as long as cells allow
 _WIDE_BLUR = 0.18  # for which they are made so long, cells
 _INSIDE = 3  # of these, without the sides where one of them may not be the marker's
-_LARGEST_CHANGE = 0.5  # of a frame at a time, cells
 _ROUNDS = 6  # iterations of robust least squares
 _MINIMUM_ERROR = 0.02  # minimum of the usual error, px
 _PLACED = 0.15  # maximum error of an edge that is where it should be, px
@@ -148,8 +147,7 @@ def _fitted(
         edges, own = fit.edges, fit.own
         if number:
             blur = np.clip(used + median(edges.softness, edges.visible, 0.0), *BLURS)
-        limit = _LARGEST_CHANGE / cells
-        frames = changed(frames, np.clip(fit.unknowns[:, :-1], -limit, limit))
+        frames = changed(frames, fit.unknowns[:, :-1])
     errors = np.abs(fit.errors * edges.scale)
     limits = np.maximum(_PLACED, (not flat) * _NOT_FLAT * cell)
     placed = own.seen & (errors < limits[:, None])

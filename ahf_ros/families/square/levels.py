@@ -27,8 +27,6 @@ from ahf_ros.vision.logarithm import LOG_OFFSET
 _IN_CELL = ((0.0, 0.0), (-0.2, -0.2), (-0.2, 0.2), (0.2, -0.2), (0.2, 0.2))
 """Where a cell is sampled, from its centre, in cells."""
 
-_BLURS = USUAL_BLUR, 0.4  # of a usual image and of a sharp one, standard deviations in px
-_SMALL_CELL = 2.0  # below which they differ, px
 _UNUSUAL = 3.0  # log odds against light that spreads over ink, or changes within a marker
 _MOST_MIXED = 0.2  # share that a cell takes from each neighbour, at most
 _REACH = 0.25  # standard deviation of the window that levels are taken from, in sides
@@ -44,30 +42,25 @@ def levels_of_cells(
     gray: np.ndarray,
     frames: np.ndarray,
     corners: np.ndarray,
-    sizes: np.ndarray,
     cells: int,
     border: int,
 ) -> Evidence:
     """Return what the cells of quadrilaterals within a border say.
 
     All are there twice, once by the darkest part of each cell, as where light has spread from
-    paper over ink; those with small cells once more, as in a sharp image.
+    paper over ink.
     """
     side = cells + 2 * border
-    small = np.flatnonzero(sizes < _SMALL_CELL * side)
-    every = np.arange(len(frames))
-    tried = np.concatenate([every, small])
-    counts = len(every), len(small)
-    blurs, spread = np.repeat(_BLURS, counts), np.repeat([True, False], counts)
+    count = len(frames)
     reach = (np.arange(side + 2) / (_REACH * (side + 2))) ** 2
     of_levels = LOG_OFFSET, _MOST_MIXED, MINIMUM_STEP, _OF_USUAL, SIDE, _EVERYWHERE
     weights = np.array([_PART_WEIGHT, BORDER_WEIGHT, _CORNER_WEIGHT])
     seen, paper, (ink, square, around), *_ = kernels.cell_evidence(
         gray,
-        frames[tried],
-        cell_sizes(corners[tried], side),
-        blurs,
-        spread,
+        frames,
+        cell_sizes(corners, side),
+        np.full(count, USUAL_BLUR),
+        np.ones(count, bool),
         kernels.exponentials(-reach / 2),
         np.array(_IN_CELL),
         *of_levels,
@@ -82,7 +75,7 @@ def levels_of_cells(
     which = np.flatnonzero(seen)
     ink, square, around = (of.ravel()[which] for of in (ink, square, around))
     return Evidence(
-        tried[which % len(tried)],
+        which % count,
         paper.reshape(-1, cells**2)[which],
         ink,
         square,

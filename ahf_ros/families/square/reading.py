@@ -100,7 +100,7 @@ def read(
             some = some[_dark_inside(gray, frames[some], innermost)]
         if not len(some):
             continue
-        for seen, features in _seen(gray, frames[some], corners[some], sizes[some], cells, border):
+        for seen, features in _seen(gray, frames[some], corners[some], cells, border):
             if not len(seen.quadrilateral):
                 continue
             which = some[seen.quadrilateral]
@@ -119,7 +119,6 @@ def _seen(
     gray: np.ndarray,
     frames: np.ndarray,
     corners: np.ndarray,
-    sizes: np.ndarray,
     cells: int,
     border: int,
 ) -> Iterator[tuple[Evidence, _Features]]:
@@ -127,7 +126,7 @@ def _seen(
     steps, even = steps_between_cells(gray, frames, corners, cells, border)
     which = np.flatnonzero(even)
     if len(which):
-        levels = levels_of_cells(gray, frames[which], corners[which], sizes[which], cells, border)
+        levels = levels_of_cells(gray, frames[which], corners[which], cells, border)
         yield replace(levels, quadrilateral=which[levels.quadrilateral]), _as_they_are
     yield steps, stepped
 
