@@ -37,7 +37,6 @@ _CLEAREST = 0.2  # share of rays
 _AGREEING = 0.5  # share of what a ray shows, that the rings explain
 _USUAL_EDGES = 0.13, 0.3  # deviations of growth, px, and of ln of the blur, of targets
 _GROWTH_HIDES = 3.0  # ln of odds, at the most growth
-_SHARPENING_HIDES = 0.8  # ln of odds, of an amount of 1
 _CLIPPING_HIDES = 3.0  # ln of odds, where all gray values are clipped
 
 
@@ -180,7 +179,7 @@ def _described(
             blur / size,
         ),
         unusual=_unusual(shift, blur, prior) * np.minimum(3 * (1 - agree), 1)
-        + _hiding(shift, sharpening, known, narrow * size),
+        + _hiding(shift, known, narrow * size),
         known=known,
         margin=np.full(len(frames), np.nan),
         by_pixels=np.zeros(len(frames)),
@@ -193,14 +192,10 @@ def _unusual(shift: np.ndarray, blur: np.ndarray, prior: Prior) -> np.ndarray:
     return (deviations**2).sum(axis=1) / 2
 
 
-def _hiding(
-    shift: np.ndarray, sharpening: np.ndarray, known: np.ndarray, narrow: np.ndarray
-) -> np.ndarray:
-    """Return by how much growth, sharpening and clipping hide narrow rings of so many px, (k,)."""
+def _hiding(shift: np.ndarray, known: np.ndarray, narrow: np.ndarray) -> np.ndarray:
+    """Return by how much growth and clipping hide narrow rings of so many px, (k,)."""
     grown = _GROWTH_HIDES * (shift / (MAXIMUM_SHIFT * narrow)) ** 8
-    sharpened = _SHARPENING_HIDES * sharpening**2 / (1 + np.abs(sharpening))
-    others = sharpened + _CLIPPING_HIDES * (1 - known)
-    return grown + others * (MASK / narrow) ** 2
+    return grown + _CLIPPING_HIDES * (1 - known) * (MASK / narrow) ** 2
 
 
 def usual_perspective(frames: np.ndarray) -> np.ndarray:

@@ -41,7 +41,6 @@ from ahf_ros.vision.log_edges import LogEdges, edges_in_bands
 from ahf_ros.vision.pyramid import ImagePyramid, Octave, octaves
 
 _COLOURS = 1, -1  # of circles that are looked for
-_SMALLEST = 2.0  # radius of circles that are looked for, px
 _BEYOND = 1.1  # times a bound of the radius, by how much circles may be beyond it
 _INNERMOST = 0.25  # of the radii of circles that are looked for
 _COMMON_CENTRE = 8.0, 20.0  # radii of targets whose rings vote together, px
@@ -366,12 +365,12 @@ def _circles(of_octaves: Sequence[Octave]) -> list[Dots]:
     first, last = of_octaves[0], of_octaves[-1]
     pyramid, low = first.pyramid, first.radii[0]
     high = last.radii[1] * 2 ** (last.level - first.level)
-    voted = voted_dots(pyramid, max(low * _INNERMOST, _SMALLEST), high, _COLOURS)
+    voted = voted_dots(pyramid, low * _INNERMOST, high, _COLOURS)
     major = frame.ellipse_axes(voted.frames)[0]
     found = []
     for octave in of_octaves:
         least, largest = octave.radii[0] * _INNERMOST, octave.radii[1]
-        whole = whole_dots(octave.pyramid, max(least, _SMALLEST), largest, _COLOURS)
+        whole = whole_dots(octave.pyramid, least, largest, _COLOURS)
         level = octave.level - first.level
         own = major / 2**level
         of_size = voted.select((own * _BEYOND >= least) & (own <= largest * _BEYOND))

@@ -46,7 +46,6 @@ _SHARPEST_FROM = math.ceil(math.log(_WIDTH / _SHARPEST) / math.log(_SIZES))  # s
 _OFFSETS = np.arange(-1.2, 1.21, 0.1)
 _STRAIGHT, _CURVED, _CURVATURE = 16, 24, 0.7
 _FIRST = 6  # edges that are tried with all others
-_SHOWN = 0.15  # length of an edge that is looked for, of the longest
 _ROUNDS = 4
 _DEVIATIONS = 0.3, 0.3, 0.4, 0.3  # of direction, offset, curvature and ln of width
 _USUAL_MOVES = 1e-3  # weight of none
@@ -237,8 +236,7 @@ def _first_edges(size: int) -> tuple[np.ndarray, np.ndarray]:
     plane, _ = np.linalg.qr((_PLACES[_FEW] * weight).reshape(2, -1).T)
     steps = steps - (steps @ plane) @ plane.T
     length = np.linalg.norm(steps, axis=1)
-    shown = length > _SHOWN * length.max()
-    return edges[shown], (steps[shown] / length[shown, None]).astype(np.float32)
+    return edges, (steps / length[:, None]).astype(np.float32)
 
 
 def usual_widths(size: np.ndarray) -> np.ndarray:

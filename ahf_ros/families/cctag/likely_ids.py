@@ -27,7 +27,6 @@ _RESAMPLED = np.maximum(
 ).astype(np.float32)
 """What interpolates rays at the radii of each scale, (scales, radii, n)."""
 _PART = 48  # targets at a time, which bounds the memory
-_ALIKE = 0.9  # share of the mean of rays, that some ID explains
 _LIKE_DISCS = 12.0  # px: two discs leave less than rings of so many px, by a factor of e at most
 _READINGS = 5  # IDs that are brought onto the image from a frame
 
@@ -99,4 +98,4 @@ def _unlike_discs(profiles: np.ndarray, shares: np.ndarray, frames: np.ndarray) 
         of_two[of_size] = two_discs(profiles[of_size], step)
     left_by_two, left = (np.maximum(1 - of, 1e-6) for of in (of_two, shares))
     better = np.log(left_by_two / left) >= -_LIKE_DISCS / frame.mean_radii(frames)
-    return (shares >= _ALIKE) & better
+    return np.asarray(better)

@@ -34,7 +34,7 @@ _LEAST_SHARPENING = 0.15  # amount, below which rays often show some where there
 _DARK = 1e-4  # light, of that on paper, that is black
 OF_INTERPOLATION = 0.17
 """Variance that reading between pixels adds to the blur of rays, px^2."""
-_SHARPEST, _SOFTEST = 0.35, 2.0  # blurs, px
+_SHARPEST = 0.35  # blur, px
 _DARKEST = -0.99  # contrast
 _MOST_CURVED, _HIGHEST, _WIDEST = 1.5, 5.0, 0.0  # edges of light: 1 / radii, ln, ln of radii
 
@@ -143,7 +143,7 @@ class Patch:
         high = np.array([self.most_shift, *[math.inf] * 4, *of_edge * edges])
         low = -high
         low[_OF_LIGHT + _WIDTH :: OF_EDGE] = -math.inf
-        low[[_BLUR, _CONTRAST]], high[_BLUR] = (math.log(_SHARPEST), _DARKEST), math.log(_SOFTEST)
+        low[[_BLUR, _CONTRAST]] = math.log(_SHARPEST), _DARKEST
         return low, high
 
     def formed(self, formed: Formed) -> tuple[Any, ...]:

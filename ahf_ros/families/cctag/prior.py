@@ -19,7 +19,7 @@ _TRIED_SHIFTS = -1.2, -0.6, 0.0, 0.6, 1.2  # deviations
 _TRIED_BLURS, _TRIED_SHARPENINGS = (-1.0, 0.0, 1.4), (3.0, 7.0)  # the same
 _ENOUGH = 4  # certain targets, that tell of the edges of an image
 _OF_CAMERA = 0.03  # standard deviation of the sharpening of one camera
-_OF_IMAGE = 0.1, 0.1, _OF_CAMERA  # of growth, ln of the blur and sharpening, of an image's targets
+_OF_IMAGE = 0.1  # of growth, ln of the blur and sharpening, of an image's targets
 _INDEPENDENT = 0.3  # distance of independent readings along a profile, px
 _AT_BEST = 0.4  # share of what an ID leaves of a mean profile, that is left where it is aligned
 
@@ -106,7 +106,7 @@ class Prior:
         edges = np.stack([rings.shift, np.log(rings.blur), rings.sharpening], axis=1)
         usual = np.median(edges, axis=0)
         spread = NORMAL * np.median(np.abs(edges - usual), axis=0)
-        variance = (count * spread**2 + _ENOUGH * np.square(_OF_IMAGE)) / (count + _ENOUGH)
+        variance = (count * spread**2 + _ENOUGH * _OF_IMAGE**2) / (count + _ENOUGH)
         shift, blur, sharpening = usual.tolist()
         of_shift, of_blur, of_sharpening = np.sqrt(variance).tolist()
         deviations = of_shift, of_blur, of_sharpening
