@@ -30,14 +30,11 @@ from ahf_ros.vision.robust import NORMAL
 _CELLS = 8  # of a marker whose cells are not known
 _MARGIN = 0.6  # of paper around a print that is looked at, cells
 _LARGEST_CELL = 12.0  # whose few edges are measured better in profiles, px
-# Deviation of edges, px, below which no print told more: of 600 markers, cells of 3.5 to 10 px.
-_EXACT = 0.01
 _SAMPLES = 4  # along a cell, at most a pixel apart where it is smaller
 _OF_OUTLINE = 2  # samples along a cell of a small marker
 _ROUNDS = 10
 _LARGEST_STEP = 0.5  # of the place of a marker in a round, cells
 _SETTLED = 0.02  # the last step of a corner at most, px
-_NEAR = 3.0  # distance of corners from where they were, px, where this is more than a cell
 _SHARPEST, _SOFTEST = 0.25, 1.0  # deviation of a blur, px and cells
 _OUTLIER = 4.0  # residual that quarters the weight, in usual ones
 _USUAL_RESIDUAL = 0.3  # minimum, gray values
@@ -68,7 +65,7 @@ def lay_prints(
     counts = np.clip(np.ceil(cell), 1, _SAMPLES).astype(int)
     of_edges = np.trace(markers.covariance, axis1=1, axis2=2)
     deviation = np.where(markers.share > 0, of_edges, np.inf)
-    tried = (cell <= largest) & (deviation > _EXACT**2)
+    tried = cell <= largest
     for count in np.unique(counts[tried]).tolist():
         which = np.flatnonzero(tried & (counts == count))
         found = _laid(gray, markers.corners[which], prints[which], count, cells)
@@ -122,7 +119,7 @@ def _laid(
         g=cells + 2,
     )
     laid = project(frames, SQUARE)
-    near = np.linalg.norm(laid - corners, axis=2).max(axis=1) < np.maximum(size / cells, _NEAR)
+    near = np.linalg.norm(laid - corners, axis=2).max(axis=1) < size / cells
     blur, paper, step, growth = unknowns[:, [_BLUR, _PAPER, _STEP, _GROWTH]].T
     step = np.where(share > 0, step, -1.0)
     contrast = (paper + step) / np.maximum(paper, 1)

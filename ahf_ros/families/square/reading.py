@@ -17,7 +17,6 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from math import exp, log
 
-import cv2
 import numpy as np
 
 from ahf_ros import kernels
@@ -31,12 +30,10 @@ from ahf_ros.prints.square import borders, corner_counts, words
 from ahf_ros.vision.array_record import ArrayRecord
 from ahf_ros.vision.logarithm import LOG_OFFSET
 
-_SMALLEST_CELL = 1.0  # that can be read, px
 _POINTS, _DEPTH = 10, 0.06  # of each side where a border is looked for, distance in sides
 _DOUBT = 6.0  # logarithmic odds against a marker that nothing but a quadrilateral speaks for
 _FIGURES = 7.0  # logarithmic odds of letters and the like against markers
 _POSSIBLE = -12.0  # minimum of these odds where all is as usual but a corner or the blur
-_CLEAR = -6.0  # maximum of the odds of other markers where these odds are low
 _PLAIN = 0.35  # logarithmic odds against a marker, for each edge less than random cells have
 
 _Features = Callable[[np.ndarray], np.ndarray]
@@ -89,12 +86,11 @@ def read(
     frames = square_frames(corners)
     bordered = np.flatnonzero(_dark_inside(gray, frames, _DEPTH))
     parallel = parallel_odds(frames, max(gray.shape))
-    sizes = np.sqrt([cv2.contourArea(of.astype(np.float32)) for of in corners])
     grids = [
         {(words(group[0]).shape[1], border) for border in borders(group[0])} for group in groups
     ]
     for cells, border in sorted(set().union(*grids)):
-        some = bordered[sizes[bordered] >= _SMALLEST_CELL * (cells + 2 * border)]
+        some = bordered
         if border > 1:
             innermost = (border - 0.5) / (cells + 2 * border)
             some = some[_dark_inside(gray, frames[some], innermost)]
@@ -111,8 +107,7 @@ def read(
                 if (cells, border) in grids[index]
             ]
     readings = Readings.joined(found)
-    shown = (readings.odds > MINIMUM_ODDS) | (readings.others < _CLEAR)
-    return readings.select(shown | everything & readings.whole)
+    return readings.select((readings.odds > MINIMUM_ODDS) | everything & readings.whole)
 
 
 def _seen(
