@@ -58,7 +58,7 @@ _FIRST_RANGES = {  # of the first level
 }
 _STEP = 0.8  # of the radii voted for, in cells
 _FLAT_PART = 0.75  # sine of the angle between an edge of an ellipse and its major axis, at most
-_REACH = 0.5  # within which no other centre has more votes, in radii of the smallest dot
+REACH = 0.5  # within which no other centre has more votes, in radii of the smallest dot
 _CELL = 2  # in which the votes for different shapes are compared, px
 _LONG = 1.5  # length of an edge that is straight, in radii of the largest dot
 _SPREAD = 1.4  # votes in a cell and beside it, in weighted votes, at the least
@@ -128,7 +128,7 @@ def _elected(
     found = Peaks.joined([_peaks(edges, radii, of, polarities) for of in shapes])
     inside = (found.x > -1) & (found.x < width) & (found.y > -1) & (found.y < height)
     found = found.select(inside)
-    reach = max(1, round(_REACH * radii[0] / _CELL))
+    reach = max(1, round(REACH * radii[0] / _CELL))
     margin = reach + 1
     tall, wide = (side // _CELL + 1 + 2 * margin for side in (height, width))
     columns, rows = (
@@ -158,7 +158,7 @@ def _peaks(
     needed = of.votes * 2 * np.pi * low
     if not len(polarities) or count * len(edges.x) <= needed:
         return _NO_PEAKS
-    reach = max(1, round(_REACH * low / of.cell))
+    reach = max(1, round(REACH * low / of.cell))
     margin = reach + ceil(high / of.cell) + 1  # votes may lie outside of the image
     tall, wide = (side // of.cell + 1 + 2 * margin for side in edges.marked.shape)
     directions = np.pi * np.arange(of.directions) / of.directions

@@ -30,14 +30,9 @@ _MAXIMUM_RADIUS = 1.35  # the same, in the largest one
 _SHAPES = ((1.0, 1), (0.75, 4), (0.55, 6), (0.4, 8))  # aspect, number of directions
 _BESIDE, _SIDES = 0.4, 6  # distance of circles beside a candidate in their radius, directions
 _COUNTED = -0.3, 0.6  # steps of ln; one beyond counts no more
-_MINIMUM_SCORE = 0.15  # mean step of ln along the ellipse
 _SMALL = 8.0  # largest radius of a range of the first level that is fitted in the image, px
-_OVERSIZE = 1.6  # semi-major axis of a dot, in the largest radius of its range, at the most
-_WINDOWS = (  # about the ellipse, in its own radius; share of inliers; rays
-    (0.5, 0.25, _FEW),
-    (0.3, 0.3, _MANY),
-    (0.15, 0.35, _MANY),
-)
+_WINDOWS = (0.5, _FEW), (0.3, _MANY), (0.15, _MANY)  # about the ellipse, in its own radius; rays
+_MINIMUM_SHARE = 0.35  # of inliers
 _MINIMUM_WINDOW, _MAXIMUM_WINDOW = 2.0, 0.5  # the same: px, and in its own radius
 _PLACES = np.linspace(-1.15, 1.15, 13)  # of samples of a profile across it, in windows
 _MINIMUM_STEP = 0.1  # of ln, for a ray to count in the fit
@@ -47,7 +42,9 @@ _ROUNDS = 3  # of robust least squares
 _OUTLIERS = 5.0  # to a window: residuals that quarter the weight of a ray
 _PRIOR = np.full(5, 1e-3)  # inverse variance of no change, in weights
 _INLIER, _PIXEL_INLIER = 0.06, 0.4  # of the radius, or px
-_MINIMUM_MINOR = 1.0  # px
+
+MINIMUM_MINOR = 1.0
+"""Smallest semi-minor axis of a dot, px."""
 
 
 def fit_ellipses(logs: Sequence[np.ndarray], candidates: Sequence[Candidates]) -> Dots:
@@ -66,17 +63,17 @@ def fit_ellipses(logs: Sequence[np.ndarray], candidates: Sequence[Candidates]) -
         low, high = (radius * shrink for radius in some.radii)
         dots = _best_ellipses(logs[level], points, some.polarity, low, high)
         dots = refine_ellipses(logs[level], dots)
-        dots = dots.select(frame.ellipse_axes(dots.frames)[0] < _OVERSIZE * high)
         found.append(replace(dots, frames=frame.enlarged(dots.frames, level)))
     return Dots.joined(found)
 
 
 def refine_ellipses(log: np.ndarray, dots: Dots) -> Dots:
     """Refine dots in px of a logarithmic image, and drop those that its edges do not support."""
-    for window, minimum_share, rays in _WINDOWS:
+    frames = dots.frames
+    for window, rays in _WINDOWS:
         frames, share = kernels.moved_ellipses(
             log,
-            dots.frames,
+            frames,
             dots.polarity / LOG_SCALE,
             *rays,
             _PLACES,
@@ -84,18 +81,15 @@ def refine_ellipses(log: np.ndarray, dots: Dots) -> Dots:
             *(_COUNTED, _FLAT, _MINIMUM_STEP, _CLEAR_STEP),
             *(window / _OUTLIERS, _ROUNDS, _PRIOR, (_INLIER, _PIXEL_INLIER)),
         )
-        dots = Dots(frames, dots.polarity, share)
-        major, minor, _ = frame.ellipse_axes(dots.frames)
-        good = (minor > MINIMUM_ASPECT * major) & (minor > _MINIMUM_MINOR)
-        good &= dots.share > minimum_share
-        dots = dots.select(good)
-    return resized(log, dots)
+    major, minor, _ = frame.ellipse_axes(frames)
+    good = (minor > MINIMUM_ASPECT * major) & (minor > MINIMUM_MINOR) & (share > _MINIMUM_SHARE)
+    return resized(log, Dots(frames, dots.polarity, share).select(good))
 
 
 def _best_ellipses(
     log: np.ndarray, points: np.ndarray, polarity: np.ndarray, low: float, high: float
 ) -> Dots:
-    """Return the ellipses about points with the highest mean steps, if these are clear."""
+    """Return the ellipses about points with the highest mean steps."""
     radii = np.geomspace(_MINIMUM_RADIUS * low, _MAXIMUM_RADIUS * high, _SIZES)
     step = np.log(radii[1] / radii[0])
     bins = np.rint(_OUTLINES / step).astype(np.int32)
@@ -106,7 +100,7 @@ def _best_ellipses(
     x, y, major, minor, angle = _ELLIPSES[best[:, 0]].T
     x, y, major, minor = radii[1 + best[:, 1]] * (x, y, major, minor)
     fitted = frame.affine_frames(points[:, 0] + x, points[:, 1] + y, major, minor, angle)
-    return Dots(fitted, polarity, highest).select(highest > _MINIMUM_SCORE)
+    return Dots(fitted, polarity, highest)
 
 
 def _outlines() -> tuple[np.ndarray, np.ndarray, np.ndarray]:

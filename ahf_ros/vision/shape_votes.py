@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from ahf_ros.vision import frame
-from ahf_ros.vision.candidates import find_peaks, votes_along
+from ahf_ros.vision.candidates import REACH, find_peaks, votes_along
 from ahf_ros.vision.dots import NO_DOTS, Dots
 from ahf_ros.vision.log_edges import LogEdges
 
@@ -20,7 +20,6 @@ NEIGHBOURS = 5
 
 _BLOCKS = 32  # of places with the same shape, along the longer side of an image
 _SHARE = 0.2  # of the outline of a dot, in edge pixels that vote for its centre
-_REACH = 0.5  # within which no other centre has more votes, in radii of the smallest dot
 _CENTRE = 0.5  # of the first pixel, in cells
 
 
@@ -61,7 +60,7 @@ def dots_in_shapes(edges: LogEdges, known: np.ndarray, polarity: int) -> Dots:
     votes = votes_along(at, towards, np.array([-polarity]), (tall, wide))
     outline = 2 * np.pi * np.sqrt((major**2 + minor**2) / 2)
     needed = _SHARE * outline.min()
-    peaks = find_peaks(votes, needed, max(1, round(_REACH * minor.min())))
+    peaks = find_peaks(votes, needed, max(1, round(REACH * minor.min())))
     x, y = peaks.x - margin, peaks.y - margin
     inside = (x > 0) & (y > 0) & (x < width - 1) & (y < height - 1)
     x, y, votes = x[inside], y[inside], needed * peaks.votes[inside]
