@@ -40,6 +40,7 @@ _SMALL = 45.0  # diagonal of a marker whose cells are not much larger than pixel
 _SMALLEST_HALF = 24  # smaller side of a half that markers are looked for in, px
 _SAME_PLACE = 0.3  # distance of two readings of one marker, in sides
 _SURE = 7.0  # logarithmic odds of a marker that is looked for in no half: a thousand to one
+_FITTED = 4.0  # logarithmic odds against a marker whose print was laid: half its eight unknowns
 _SEVERAL = 4.0  # power of their number, one in which each of several groups is there
 _ALONE = 2.9  # ... one marker alone shows
 _OF_PLAIN = 4.5  # the most that a marker which letters look like shows, logarithmic odds
@@ -122,6 +123,8 @@ class SquareDetector(ExpectingDetector):
             of_half = replace(of_half, corners=_enlarged(of_half.corners, level))
             found.append(self._compared(halves[: level + 1], of_half, groups))
         readings = Readings.joined(found)
+        laid = read(gray, _laid(gray, readings, groups), groups, expected)
+        readings = Readings.joined([readings, replace(laid, odds=laid.odds - _FITTED)])
         certain = readings.odds > MINIMUM_ODDS
         sure = readings.select(certain)
         doubtful = readings.select(everything & ~certain & readings.whole)
@@ -215,6 +218,24 @@ def _halvings(corners: np.ndarray) -> np.ndarray:
     """Return how often the image is halved until markers are no larger than `_LARGE`, (k,)."""
     sides = side_lengths(corners).max(axis=1)
     return np.ceil(np.log2(np.maximum(sides / _LARGE, 1))).astype(int)
+
+
+def _laid(gray: np.ndarray, readings: Readings, groups: Groups) -> np.ndarray:
+    """Return the corners of prints that lie over the image where readings are doubtful."""
+    readings = readings.select(np.argsort(-readings.odds, kind='stable'))
+    own = readings.select(_owning(readings, of_print=True) & (readings.odds <= MINIMUM_ODDS))
+    parts: dict[int, list[tuple[np.ndarray, np.ndarray]]] = {}
+    for index, width in sorted(set(zip(own.group.tolist(), own.border.tolist(), strict=True))):
+        alike = own.select((own.group == index) & (own.border == width))
+        cells = words(groups[index][-1])[alike.number]
+        prints = ~np.pad(cells, ((0, 0), (width, width), (width, width)))
+        parts.setdefault(prints.shape[1], []).append((alike.corners, prints))
+    found = [np.zeros((0, 4, 2))]
+    for of_size in parts.values():
+        places, prints = map(np.concatenate, zip(*of_size, strict=True))
+        fit = lay_prints(gray, Places.unmeasured(places), prints)
+        found.append(fit.corners[fit.share > 0])
+    return np.concatenate(found)
 
 
 def _odds_together(readings: Readings, groups: Groups) -> np.ndarray:

@@ -35,6 +35,7 @@ _OF_OUTLINE = 2  # samples along a cell of a small marker
 _ROUNDS = 10
 _LARGEST_STEP = 0.5  # of the place of a marker in a round, cells
 _SETTLED = 0.02  # the last step of a corner at most, px
+_NEAR = 3.0  # distance of corners from where they were, px, where this is more than a cell
 _SHARPEST, _SOFTEST = 0.25, 1.0  # deviation of a blur, px and cells
 _OUTLIER = 4.0  # residual that quarters the weight, in usual ones
 _USUAL_RESIDUAL = 0.3  # minimum, gray values
@@ -119,7 +120,7 @@ def _laid(
         g=cells + 2,
     )
     laid = project(frames, SQUARE)
-    near = np.linalg.norm(laid - corners, axis=2).max(axis=1) < size / cells
+    near = np.linalg.norm(laid - corners, axis=2).max(axis=1) < np.maximum(size / cells, _NEAR)
     blur, paper, step, growth = unknowns[:, [_BLUR, _PAPER, _STEP, _GROWTH]].T
     step = np.where(share > 0, step, -1.0)
     contrast = (paper + step) / np.maximum(paper, 1)

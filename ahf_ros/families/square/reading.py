@@ -34,6 +34,7 @@ _POINTS, _DEPTH = 10, 0.06  # of each side where a border is looked for, distanc
 _DOUBT = 6.0  # logarithmic odds against a marker that nothing but a quadrilateral speaks for
 _FIGURES = 7.0  # logarithmic odds of letters and the like against markers
 _POSSIBLE = -12.0  # minimum of these odds where all is as usual but a corner or the blur
+_CLEAR = -6.0  # maximum of the odds of other markers where these odds are low
 _PLAIN = 0.35  # logarithmic odds against a marker, for each edge less than random cells have
 
 _Features = Callable[[np.ndarray], np.ndarray]
@@ -107,7 +108,8 @@ def read(
                 if (cells, border) in grids[index]
             ]
     readings = Readings.joined(found)
-    return readings.select((readings.odds > MINIMUM_ODDS) | everything & readings.whole)
+    shown = (readings.odds > MINIMUM_ODDS) | (readings.others < _CLEAR)
+    return readings.select(shown | everything & readings.whole)
 
 
 def _seen(
