@@ -31,6 +31,7 @@ _SHAPES = ((1.0, 1), (0.75, 4), (0.55, 6), (0.4, 8))  # aspect, number of direct
 _BESIDE, _SIDES = 0.4, 6  # distance of circles beside a candidate in their radius, directions
 _COUNTED = -0.3, 0.6  # steps of ln; one beyond counts no more
 _SMALL = 8.0  # largest radius of a range of the first level that is fitted in the image, px
+_OVERSIZE = 1.6  # semi-major axis of a dot, in the largest radius of its range, at the most
 _WINDOWS = (0.5, _FEW), (0.3, _MANY), (0.15, _MANY)  # about the ellipse, in its own radius; rays
 _MINIMUM_SHARE = 0.35  # of inliers
 _MINIMUM_WINDOW, _MAXIMUM_WINDOW = 2.0, 0.5  # the same: px, and in its own radius
@@ -63,6 +64,7 @@ def fit_ellipses(logs: Sequence[np.ndarray], candidates: Sequence[Candidates]) -
         low, high = (radius * shrink for radius in some.radii)
         dots = _best_ellipses(logs[level], points, some.polarity, low, high)
         dots = refine_ellipses(logs[level], dots)
+        dots = dots.select(frame.ellipse_axes(dots.frames)[0] < _OVERSIZE * high)
         found.append(replace(dots, frames=frame.enlarged(dots.frames, level)))
     return Dots.joined(found)
 
