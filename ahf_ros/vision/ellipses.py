@@ -32,8 +32,11 @@ _BESIDE, _SIDES = 0.4, 6  # distance of circles beside a candidate in their radi
 _COUNTED = -0.3, 0.6  # steps of ln; one beyond counts no more
 _SMALL = 8.0  # largest radius of a range of the first level that is fitted in the image, px
 _OVERSIZE = 1.6  # semi-major axis of a dot, in the largest radius of its range, at the most
-_WINDOWS = (0.5, _FEW), (0.3, _MANY), (0.15, _MANY)  # about the ellipse, in its own radius; rays
-_MINIMUM_SHARE = 0.35  # of inliers
+_WINDOWS = (  # about the ellipse, in its own radius; share of inliers; rays
+    (0.5, 0.25, _FEW),
+    (0.3, 0.3, _MANY),
+    (0.15, 0.35, _MANY),
+)
 _MINIMUM_WINDOW, _MAXIMUM_WINDOW = 2.0, 0.5  # the same: px, and in its own radius
 _PLACES = np.linspace(-1.15, 1.15, 13)  # of samples of a profile across it, in windows
 _MINIMUM_STEP = 0.1  # of ln, for a ray to count in the fit
@@ -71,11 +74,10 @@ def fit_ellipses(logs: Sequence[np.ndarray], candidates: Sequence[Candidates]) -
 
 def refine_ellipses(log: np.ndarray, dots: Dots) -> Dots:
     """Refine dots in px of a logarithmic image, and drop those that its edges do not support."""
-    frames = dots.frames
-    for window, rays in _WINDOWS:
+    for window, minimum_share, rays in _WINDOWS:
         frames, share = kernels.moved_ellipses(
             log,
-            frames,
+            dots.frames,
             dots.polarity / LOG_SCALE,
             *rays,
             _PLACES,
@@ -83,9 +85,12 @@ def refine_ellipses(log: np.ndarray, dots: Dots) -> Dots:
             *(_COUNTED, _FLAT, _MINIMUM_STEP, _CLEAR_STEP),
             *(window / _OUTLIERS, _ROUNDS, _PRIOR, (_INLIER, _PIXEL_INLIER)),
         )
-    major, minor, _ = frame.ellipse_axes(frames)
-    good = (minor > MINIMUM_ASPECT * major) & (minor > MINIMUM_MINOR) & (share > _MINIMUM_SHARE)
-    return resized(log, Dots(frames, dots.polarity, share).select(good))
+        dots = Dots(frames, dots.polarity, share)
+        major, minor, _ = frame.ellipse_axes(dots.frames)
+        good = (minor > MINIMUM_ASPECT * major) & (minor > MINIMUM_MINOR)
+        good &= dots.share > minimum_share
+        dots = dots.select(good)
+    return resized(log, dots)
 
 
 def _best_ellipses(
