@@ -10,8 +10,9 @@ in calls. A gate that loses more than 2 in 1,000 targets is to be loosened or go
 that saves nothing. What works on whole arrays saves time rather than calls: the processor time is
 shown as well, but depends on the machine.
 
-The pictures are those of a folder with a `truth.csv`, photographs with truth, and rendered scenes.
-Each gate has a process of its own, and takes a minute for twenty pictures.
+The pictures are those of a folder with a `truth.csv`, photographs with truth, rendered scenes,
+covered targets, and images without any. Each gate has a process of its own, and takes a minute for
+twenty pictures.
 """
 
 import argparse
@@ -38,6 +39,8 @@ from ahf_ros.scenes.scene import SceneSettings, render
 from benchmarks import report
 from benchmarks.changed import Shown, assigned, definitions
 from support import PHOTOS, ROOT, environment
+from support.pictures.disturbed import Targets
+from support.pictures.textures import lookalikes, text_page, textured_image
 
 YARDSTICK = ROOT.parent / 'shared' / 'yardstick'
 """Pictures that another renderer and cameras made, which are no part of the package."""
@@ -64,6 +67,15 @@ RENDERED: dict[str, tuple[tuple[str, ...], tuple[tuple[float, float], ...]]] = {
 }
 """Families of rendered scenes by detector, and radii of dots, px, with the ambient light of each
 beside the projected, where readings begin to fail."""
+
+COVERS = 'gray 128 over 2 whole sectors', 'white over 2 sectors', '6 scratches 1 to 3 px wide'
+"""What covers targets, of the disturbances of `Targets`, where readings begin to fail."""
+
+COVERED = 72
+"""Targets with each cover."""
+
+EMPTY = {textured_image: 7, lookalikes: 7, text_page: 1}
+"""What draws images without targets, and how many of them."""
 
 SHOWN_LENGTH = 30
 """Longest value that the table shows, characters."""
@@ -225,6 +237,28 @@ def rendered(
         yield Picture(name, scene.image, truth, family)
 
 
+def covered(detector: str, seeds: Sequence[int], texts: Sequence[str]) -> Iterator[Picture]:
+    """Yield the chosen sheets of covered rings or squares by family, seed and cover."""
+    families = RENDERED[detector][0] if detector in ('ring', 'square') else ()
+    for family, seed in product(families, seeds):
+        for cover, scenes in Targets(family, COVERED, seed).rows():
+            name = f'{cover} {family} {seed}'
+            if cover not in COVERS or not chosen(name, texts):
+                continue
+            for image, targets in scenes:
+                truth = tuple((str(it.id), it.x, it.y) for it in targets)
+                yield Picture(name, image, truth, family)
+
+
+def empty(detector: str, seeds: Sequence[int], texts: Sequence[str]) -> Iterator[Picture]:
+    """Yield the chosen images without targets by what draws them and seed."""
+    for (draw, count), seed in product(EMPTY.items(), seeds):
+        for number in range(count):
+            name = f'{draw.__name__} {seed} {number}'
+            if chosen(name, texts):
+                yield Picture(name, draw(100 * seed + number), (), RENDERED[detector][0][0])
+
+
 def pictures(
     detector: str, seeds: Sequence[int], folder: Path, texts: Sequence[str]
 ) -> Iterator[Picture]:
@@ -233,6 +267,8 @@ def pictures(
     if detector == 'ring':
         yield from photographs(texts)
     yield from rendered(detector, seeds, texts)
+    yield from covered(detector, seeds, texts)
+    yield from empty(detector, seeds, texts)
 
 
 def written(some: Sequence[Picture], folder: Path) -> dict[str, Picture]:

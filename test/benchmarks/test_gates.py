@@ -128,6 +128,17 @@ def test_pictures_are_chosen_by_a_part_of_their_names() -> None:
     assert {gates.kind_of_detector(it) for it in ('aruco_4x4_50', 'apriltag_36h11')} == {'square'}
 
 
+def test_some_targets_are_covered_and_some_pictures_show_none(tmp_path: Path) -> None:
+    asked = ['gray 128 over 2 whole sectors', 'textured_image 1 3', 'text_page 1 0']
+    shown = list(gates.pictures('square', [1], tmp_path, asked))
+    covered = [it for it in shown if 'gray 128' in it.name]
+    assert {it.family for it in covered} == {'aruco_4x4_50', 'apriltag_36h11'}
+    assert sum(len(it.truth) for it in covered) == 2 * gates.COVERED
+    empty = [it.name for it in shown if not it.truth]
+    assert sorted(empty) == ['text_page 1 0', 'textured_image 1 3']
+    assert not any('over' in it.name for it in gates.pictures('gsi', [1], tmp_path, asked))
+
+
 def test_two_in_a_thousand_may_die() -> None:
     assert not Difference(targets=1000, gained=2).loses
     assert Difference(targets=1000, gained=3).loses
