@@ -27,6 +27,7 @@ MAXIMUM_OUTLINES = 20_000
 
 _LEVELS = 2  # whose edges may follow a whole outline; those of the second are less noisy
 _MAXIMUM_SPREAD = 0.15  # of the radius, of the points of a whole ellipse
+_MINIMUM_AGREEMENT = 0.7  # mean of the signs of their gradients along the outward direction
 _MINIMUM_LENGTH = 0.6  # of an outline, in circumferences of the smallest circle, in edge pixels
 _MAXIMUM_LENGTH = 1.1  # the same, in circumferences of the largest
 _DEGENERATE = 1e-6  # px^4, smallest determinant of a covariance, of a line
@@ -108,8 +109,8 @@ def whole_outlines(edges: LogEdges, min_radius: float, max_radius: float) -> Dot
     outwards = mean(np.sign(pixels.unit_x * x + pixels.unit_y * y))
     middle, half = (xx + yy) / 2, np.hypot((xx - yy) / 2, xy)
     major, minor = np.sqrt(middle + half), np.sqrt(np.maximum(middle - half, 0))
-    good = (spread < _MAXIMUM_SPREAD) & (minor >= MINIMUM_MINOR)
-    good &= (major >= min_radius) & (major <= max_radius)
+    good = (spread < _MAXIMUM_SPREAD) & (np.abs(outwards) > _MINIMUM_AGREEMENT)
+    good &= (major >= min_radius) & (major <= max_radius) & (minor >= MINIMUM_MINOR)
     some = best(np.flatnonzero(good), spread[good], MAXIMUM_OUTLINES, 'whole ellipses')
     frames = frame.affine_frames(
         centre_x, centre_y, major, minor, np.arctan2(xy, (xx - yy) / 2) / 2

@@ -36,6 +36,8 @@ _PART = 64  # targets at a time, which bounds the memory
 
 _PLAUSIBLE = 0.75  # support of a hypothesis that is followed up
 _CLEAR = 0.95  # the same, where only obvious targets are looked for; these have 1
+_MAXIMUM = 250  # hypotheses that are followed up, those with the most support
+_MISFIT = 0.1  # support that a misfit of 1 of the template costs in the order of these
 _APART = 0.8  # distance of the reference points of different targets, in their reach
 _CLEARLY = 0.12  # support by which the better one of two groups that lie closer is better
 
@@ -168,7 +170,8 @@ def plausible(
     Of several groups that lie too close for all to be targets, those that are clearly worse are
     left out; all but the best one, if only obvious targets are looked for.
     """
-    order = np.argsort(-readings.support, kind='stable')
+    rank = readings.support - _MISFIT * templates.misfit
+    order = np.argsort(-rank, kind='stable')
     order = order[readings.support[order] >= least_support(obvious=obvious)]
     own_dot = float(family.template_radii[family.reference])
     units = reference_frames(templates.homographies[order], own_dot)
@@ -180,7 +183,7 @@ def plausible(
         worse = support < support[of, None] - (0.0 if obvious else _CLEARLY)
         return alike(of) & (words == words[of, None]) | near(of) & worse
 
-    return order[owners(len(order), rivals)]
+    return order[owners(len(order), rivals)][:_MAXIMUM]
 
 
 def resolve(hypotheses: Hypotheses, family: PointPrint, minimum: float = CERTAIN) -> np.ndarray:
