@@ -15,6 +15,8 @@ from ahf_ros.prints.square import marker, words
 from ahf_ros.scenes.evaluation import score
 from ahf_ros.scenes.scene import Rendering
 from ahf_ros.vision.image import GAMMA
+from support.pictures.exposure import Exposure
+from support.pictures.sheets import target_sheet
 from support.pictures.textures import textured_image
 from support.scenes import around, counted, rendering
 from support.square_markers import needs_square_markers
@@ -126,6 +128,14 @@ def test_hardly_any_texture_is_a_marker() -> None:
 @pytest.mark.parametrize(('family', 'seed'), [('aruco_4x4_1000', 4), ('aruco_4x4_50', 39)])
 def test_letters_are_no_markers_with_few_edges(family: str, seed: int) -> None:
     assert create_detector(family=family)(textured_image(seed)) == []
+
+
+def test_one_marker_of_a_larger_dictionary_is_read_among_many_of_a_smaller_one() -> None:
+    sheet = target_sheet('aruco_4x4_1000', [*range(35), 73], 5)
+    found = create_detector(family=','.join(SQUARE_NAMES))(sheet.photograph(Exposure()))
+    assert {(it.family, it.id) for it in found} == {
+        ('aruco_4x4_100', number) for number in (*range(35), 73)
+    }
 
 
 def test_letters_show_no_dictionary() -> None:

@@ -44,6 +44,7 @@ _FITTED = 4.0  # logarithmic odds against a marker whose print was laid: half it
 _SEVERAL = 4.0  # power of their number, one in which each of several groups is there
 _ALONE = 2.9  # ... one marker alone shows
 _OF_PLAIN = 4.5  # the most that a marker which letters look like shows, logarithmic odds
+_LARGER = 6.9  # logarithmic odds against a larger dictionary where most markers are of a smaller
 _LOST = 12.0  # logarithmic odds against a marker that only a half shows
 _PRINTED = 4.5  # size of a cell, px, below which a whole print tells more than edges do
 # Side of a marker, px, of which finer images show no more, and whose straight edges give its
@@ -268,7 +269,7 @@ def _odds_together(readings: Readings, groups: Groups) -> np.ndarray:
         leading[some] = -np.inf
         np.maximum.at(leading, some, lead[of_this])
         together, shown = np.cumsum(surest)[sizes - 1], np.cumsum(surest > 0)[sizes - 1]
-        by_chance = shown[:-1] * np.diff(np.log(sizes))
+        by_chance = np.minimum(shown[:-1] * np.diff(np.log(sizes)), _LARGER)
         size = sizes[np.argmax(together - np.cumsum([0.0, *by_chance]))]
         there = max(whole[:size].max() - alone, surest[:size].sum() - doubt)
         rivals = -leading[:size].sum()
