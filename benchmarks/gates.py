@@ -33,6 +33,7 @@ import cv2
 import numpy as np
 from ruamel.yaml import YAML
 
+from ahf_ros.base.target import Target, TrueTarget
 from ahf_ros.files.truth_files import read_truth
 from ahf_ros.prints.families import KINDS
 from ahf_ros.scenes.scene import SceneSettings, render
@@ -193,6 +194,11 @@ def pictures_of_folder(folder: Path, detector: str, texts: Sequence[str]) -> Ite
             yield Picture(name, image, tuple(truth), family)
 
 
+def _shown(targets: Sequence[Target | TrueTarget]) -> tuple[Shown, ...]:
+    """Return targets as pictures have them."""
+    return tuple((str(it.id), it.x, it.y) for it in targets)
+
+
 def photographs(texts: Sequence[str]) -> Iterator[Picture]:
     """Yield the chosen photographs of the panel, if they are there."""
     panel = PHOTOS / 'panel'
@@ -201,8 +207,7 @@ def photographs(texts: Sequence[str]) -> Iterator[Picture]:
         if chosen(name, texts):
             image = cv2.imread(str(panel / file_name), cv2.IMREAD_GRAYSCALE)
             assert image is not None, file_name
-            truth = tuple((str(it.id), it.x, it.y) for it in targets)
-            yield Picture(name, image, truth, 'aicon14')
+            yield Picture(name, image, _shown(targets), 'aicon14')
 
 
 def rendered(
@@ -233,8 +238,7 @@ def rendered(
             seed=seed,
         )
         scene = render(settings)
-        truth = tuple((str(it.id), it.x, it.y) for it in scene.targets)
-        yield Picture(name, scene.image, truth, family)
+        yield Picture(name, scene.image, _shown(scene.targets), family)
 
 
 def covered(detector: str, seeds: Sequence[int], texts: Sequence[str]) -> Iterator[Picture]:
@@ -246,8 +250,7 @@ def covered(detector: str, seeds: Sequence[int], texts: Sequence[str]) -> Iterat
             if cover not in COVERS or not chosen(name, texts):
                 continue
             for image, targets in scenes:
-                truth = tuple((str(it.id), it.x, it.y) for it in targets)
-                yield Picture(name, image, truth, family)
+                yield Picture(name, image, _shown(targets), family)
 
 
 def empty(detector: str, seeds: Sequence[int], texts: Sequence[str]) -> Iterator[Picture]:

@@ -29,7 +29,7 @@ from ahf_ros.vision.robust import NORMAL
 
 _ENOUGH = 4  # targets, and edges of light, that tell what is usual
 _SHOWN = 0.3  # ln of the height of an edge of light that tells
-_MOST = 0.3  # change at once
+_MOST = 0.3  # change at once, of the frame and of all else
 _NEAR = 0.3, 0.3, 0.4, 1.0, 0.3  # deviations of an edge of light from where it was
 _PRIOR = Prior()
 _VALUES = _PRIOR.shift, math.log(_PRIOR.blur), 0.0, 0.0, 0.0  # of `Usual`, as the next
@@ -43,7 +43,9 @@ _OUTLIERS = 16.0, *([6.0] * 11)  # deviations that quarter a weight, in rounds
 _FREE = 10  # pixels more than parameters, at the least
 _TRIALS = 4
 _DAMPING = 1e-3, 1e-4  # at first, and at least
-_CHANGING = 0.02  # the same, and of edges of light, px and radii
+_CHANGING = (
+    0.02  # of a centre, px, and of edges of light, from which derivatives are computed again
+)
 _STAYING, _BY_PLACE = 1e-3, 10.0  # move of a centre, px, and of edges by that
 _OF_VARIANCE = 1.4  # of gray values, that their model adds
 _DIFFERENT = 2.0  # deviations of a print that counts as one

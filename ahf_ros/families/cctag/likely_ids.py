@@ -97,5 +97,4 @@ def _unlike_discs(profiles: np.ndarray, shares: np.ndarray, frames: np.ndarray) 
     for step, of_size in by_value(size_steps(frame.mean_radii(frames))):
         of_two[of_size] = two_discs(profiles[of_size], step)
     left_by_two, left = (np.maximum(1 - of, 1e-6) for of in (of_two, shares))
-    better = np.log(left_by_two / left) >= -_LIKE_DISCS / frame.mean_radii(frames)
-    return np.asarray(better)
+    return np.asarray(np.log(left_by_two / left) >= -_LIKE_DISCS / frame.mean_radii(frames))
