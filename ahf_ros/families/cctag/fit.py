@@ -43,9 +43,7 @@ _OUTLIERS = 16.0, *([6.0] * 11)  # deviations that quarter a weight, in rounds
 _FREE = 10  # pixels more than parameters, at the least
 _TRIALS = 4
 _DAMPING = 1e-3, 1e-4  # at first, and at least
-_CHANGING = (
-    0.02  # of a centre, px, and of edges of light, from which derivatives are computed again
-)
+_CHANGING = 0.02  # move of a centre, px, and change of edges of light, for new derivatives
 _STAYING, _BY_PLACE = 1e-3, 10.0  # move of a centre, px, and of edges by that
 _OF_VARIANCE = 1.4  # of gray values, that their model adds
 _DIFFERENT = 2.0  # deviations of a print that counts as one
