@@ -11,6 +11,7 @@ from ahf_ros.base.target import Target
 from ahf_ros.families import create_detector
 from ahf_ros.families.cctag.light import EDGES, Lights
 from ahf_ros.prints import CCTAG_NAMES
+from ahf_ros.prints.cctag import circle_family
 from ahf_ros.scenes.scene import Rendering
 from support.pictures.textures import lookalikes, textured_image
 from support.scenes import counted, errors, rendering
@@ -63,6 +64,49 @@ def test_targets_are_read_out_of_focus() -> None:
     disc = np.clip(5.5 - radii, 0, 1)
     image = cv2.filter2D(shown.image, -1, disc / disc.sum())
     assert counted(shown, create_detector(family='cctag3')(image)) == (4, 0, 0)
+
+
+@pytest.mark.lasting
+@pytest.mark.parametrize(('radius', 'blur', 'seed'), [(80.0, 4.8, 5), (130.0, 8.45, 4)])
+def test_large_rings_that_blur_nearly_hides_are_read(
+    radius: float, blur: float, seed: int
+) -> None:
+    side = round(5.5 * radius)
+    shown = scene(dot_radius=radius, blur=blur, width=side, height=side, targets=1, seed=seed)
+    assert counted(shown, create_detector(family='cctag3')(shown.image)) == (1, 0, 0)
+
+
+def drawing(number: int, radius: float, side: int) -> np.ndarray:
+    """Return a drawing, in whose middle is a target of `cctag3`."""
+    fine, image = 64, np.full((side, side), 255, np.uint8)
+    centre, radii = round((side - 1) / 2 * fine), circle_family('cctag3').radii(np.array([number]))
+    for index, of in enumerate(radii[0]):
+        size, ink = round(of * radius * fine), 0 if index % 2 == 0 else 255
+        cv2.circle(image, (centre, centre), size, ink, -1, cv2.LINE_AA, 6)
+    return image
+
+
+@pytest.mark.lasting
+@pytest.mark.parametrize(
+    ('number', 'radius', 'side'),
+    [(0, 434.31, 1216), (0, 447.17, 1252), (11, 1017.0, 2951), (11, 1081.0, 3135)],
+)
+def test_large_targets_are_placed_by_their_edges(number: int, radius: float, side: int) -> None:
+    (found,) = create_detector(family='cctag3')(drawing(number, radius, side))
+    assert found.id == number
+    assert (found.x, found.y) == pytest.approx(((side - 1) / 2,) * 2, abs=0.02)
+
+
+@pytest.mark.lasting
+def test_large_targets_that_are_out_of_focus_stay_where_they_are_sharp() -> None:
+    image = cv2.GaussianBlur(drawing(4, 500.0, 1450), (0, 0), 20.0)
+    noise = np.random.default_rng(1).normal(0, 2, image.shape)
+    image = np.clip(40 + 0.6 * image + noise, 0, 255).round().astype(np.uint8)
+    (found,) = create_detector(family='cctag3')(image)
+    away = np.array([found.x, found.y]) - 1449 / 2
+    assert found.id == 4
+    assert np.abs(away).max() < 0.15
+    assert away @ np.linalg.inv(np.reshape(found.covariance, (2, 2))) @ away < 9
 
 
 @pytest.mark.lasting

@@ -37,6 +37,7 @@ def check(shown: Collage, family: str) -> None:
         ('aicon14', [115.0, 95.0], VENDORS),
         ('dots', [185.0, 95.0, 20.0, 8.0], 'dots'),
         ('gsi', [60.0, 20.0, 5.0], 'gsi'),
+        ('cctag4', [200.0, 90.0, 60.0, 20.0], 'cctag3,cctag4'),
         pytest.param(SQUARE, [150.0, 20.0, 6.0], SQUARE, marks=needs_square_markers),
     ],
 )

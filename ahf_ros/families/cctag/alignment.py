@@ -36,6 +36,7 @@ _MOST_OF_EDGES = 0.3, 0.3, 1.0  # change of shift, ln of the blur and sharpening
 _CLEAREST = 0.2  # share of rays
 _AGREEING = 0.5  # share of what a ray shows, that the rings explain
 _USUAL_EDGES = 0.13, 0.3  # deviations of growth, px, and of ln of the blur, of targets
+_OUT_OF_FOCUS = 0.5  # blur that is not unusual, widths of narrow rings
 _GROWTH_HIDES = 3.0  # ln of odds, at the most growth
 _CLIPPING_HIDES = 3.0  # ln of odds, where all gray values are clipped
 
@@ -178,7 +179,7 @@ def _described(
             good[..., None] * rays.weight * rays.gain**2,
             blur / size,
         ),
-        unusual=_unusual(shift, blur, prior) * np.minimum(3 * (1 - agree), 1)
+        unusual=_unusual(shift, blur, narrow * size, prior) * np.minimum(3 * (1 - agree), 1)
         + _hiding(shift, known, narrow * size),
         known=known,
         margin=np.full(len(frames), np.nan),
@@ -186,9 +187,16 @@ def _described(
     )
 
 
-def _unusual(shift: np.ndarray, blur: np.ndarray, prior: Prior) -> np.ndarray:
-    """Return half the squares of deviations of edges, (k,): chance finds rings of any growth."""
-    deviations = np.stack([shift - prior.shift, np.log(blur / prior.blur)], axis=1) / _USUAL_EDGES
+def _unusual(shift: np.ndarray, blur: np.ndarray, narrow: np.ndarray, prior: Prior) -> np.ndarray:
+    """Return half the squares of deviations of edges, (k,): chance finds rings of any growth.
+
+    Rings that are out of focus are as usual as those of a smaller image.
+    """
+    times = np.clip(_OUT_OF_FOCUS * narrow / prior.blur, 1, np.maximum(blur / prior.blur, 1))
+    deviations = np.stack(
+        [shift / times - prior.shift, np.log(blur / (times * prior.blur))], axis=1
+    )
+    deviations /= _USUAL_EDGES
     return (deviations**2).sum(axis=1) / 2
 
 

@@ -18,6 +18,7 @@ import numpy as np
 from ahf_ros.base.blas import one_blas_thread
 from ahf_ros.base.target import UNDECODED, Target, sorted_targets
 from ahf_ros.families.cctag.alignment import align
+from ahf_ros.families.cctag.full_size import are_sharp, fit_rings
 from ahf_ros.families.cctag.glance import LARGEST, Circles, likely_rings
 from ahf_ros.families.cctag.joint import contested, jointly
 from ahf_ros.families.cctag.light import EDGES, Lights, shares_alike
@@ -32,6 +33,7 @@ from ahf_ros.prints import CCTAG_NAMES
 from ahf_ros.prints.cctag import CctagPrint, circle_family
 from ahf_ros.vision import frame
 from ahf_ros.vision.candidates import find_peaks, votes_along
+from ahf_ros.vision.circle_fit import ENOUGH
 from ahf_ros.vision.dot_search import voted_dots, whole_dots
 from ahf_ros.vision.dots import Dots
 from ahf_ros.vision.ellipse_targets import ellipse_fields, frames_of, stayed, targets_from_frames
@@ -56,6 +58,8 @@ _ALIKE = 0.25  # share of what rays show, the same on all in light without edges
 _IN_A_ROW = 32  # likely frames without a target, which hardly any others precede
 _CERTAIN = 0.75  # confidence from which a target is reported
 _SURE_OF_TARGET = 0.9  # probability of a target, from which it is reported without its ID
+_LARGE = 6.0  # narrow rings, px, whose edges are measured one by one where they are sharp
+_OF_RAYS = 160.0  # radius, px, up to which rays have places enough for edges that are soft
 _PLAUSIBLE = 0.6  # share of rays that agree, of a target that is measured again
 _SAME_PLACE = 0.5  # distance of two readings of one target, radii
 _OVERLAPPING = 0.7  # distance up to which targets overlap, sums of their radii
@@ -104,6 +108,7 @@ class CctagDetector(PyramidDetector):
         refined = list(targets)
         for family in self.design:
             known = [it for it in targets if it.id != UNDECODED and it.family == family.name]
+            refined, known = _by_edges(gray, refined, known, family)
             if not known:
                 continue
             start = frames_of(known)
@@ -115,6 +120,7 @@ class CctagDetector(PyramidDetector):
             of = align(gray, start, ids, edges, family)
             light, of, _ = in_light(gray, of, family)
             good = stayed(of.frames, start) & (of.rays >= _PLAUSIBLE)
+            good &= frame.mean_radii(start) <= _OF_RAYS
             of = of.replaced(good, jointly(gray, light, of.select(good), family))
             places = ellipse_fields(of.frames, of.covariance, of.edge_shift)
             refined = moved_targets(refined, known, places, good)
@@ -213,7 +219,7 @@ def _identified(gray: np.ndarray, look: _Look) -> tuple[Aligned, np.ndarray]:
     polarity, family = look.polarity, look.family
     rings, count = _first_readings(gray, look)
     frames = look.frames[:count]
-    possible = rings.select(rings.of_target >= _POSSIBLE)
+    possible = _best(rings, look.prior)
     if not len(possible.ids):
         return possible, gray
     light, again, lights = in_light(gray, possible, family)
@@ -358,6 +364,24 @@ def _owned(gray: np.ndarray, rings: Aligned, polarity: int, family: CctagPrint) 
     beaten = (against < 0).sum()
     of_family = np.log((len(likely) - beaten + 1) / (beaten + 1))
     return replace(rings, margin=np.minimum(rings.margin, against + of_family))
+
+
+def _by_edges(
+    gray: np.ndarray, targets: Sequence[Target], known: Sequence[Target], family: CctagPrint
+) -> tuple[list[Target], list[Target]]:
+    """Return targets, large known ones in the places of their sharp edges, and the others."""
+    refined, left = list(targets), []
+    for number, polarity in sorted({(it.id, it.polarity) for it in known}):
+        some = [it for it in known if (it.id, it.polarity) == (number, polarity)]
+        start = frames_of(some)
+        of = fit_rings(gray, start, number, np.full(len(some), polarity), family)
+        good = (of.share >= ENOUGH) & stayed(of.frames, start)
+        good &= frame.ellipse_axes(start)[1] * family.narrow >= _LARGE
+        good &= are_sharp(gray, start, number, family)
+        places = ellipse_fields(of.frames, of.covariance, of.growth)
+        refined = moved_targets(refined, some, places, good)
+        left += [it for it, done in zip(some, good, strict=True) if not done]
+    return refined, left
 
 
 def _circles(of_octaves: Sequence[Octave]) -> list[Dots]:

@@ -17,6 +17,7 @@ from ahf_ros import kernels
 from ahf_ros.families.cctag.rays import PROFILE, RAYS, ray_angles
 from ahf_ros.families.cctag.templates import (
     CLIPPED,
+    DEFOCUSED,
     SIZE_STEP,
     Edge,
     by_value,
@@ -37,14 +38,13 @@ _EDGES: tuple[Edge, ...] = (
     *((0.0, 0.9, more, 0.0) for more in (0.0, 1.0)),
     *((shift, 0.9, 0.0, share) for shift in (-0.4, 0.0) for share in CLIPPED),
 )  # of dark ink
-_DEFOCUSED = 0.6  # blur, widths of narrow rings
 _INNERMOST, _RATIO = 0.12, 1.035  # radius from which an outermost circle is read, and to the next
 _OUTERMOST = range(-3, 2)  # steps of the radius to that of the outermost circle, where it is found
 _NARROWEST = 0.5  # ring that is read, px; blur hides others
 _PROMISING = 0.6  # share of a profile that rings explain, from which they are looked at
 _OF_DISCS = 0.9  # of 1, so that of rings in one place those that leave least are looked at
 _LOOKED_AT = 2  # frames for an ID, at the most
-_APART = 0.1  # distance of the centres of different frames, radii
+_APART = 0.03  # distance of the centres of different frames, radii
 _LEAST_UNLIKE = 1e-6  # of squares of gray values, of their mean
 _READ = 128  # circles that are read at a time
 _IN_A_ROW = 8  # templates whose mean is compared before them
@@ -137,7 +137,7 @@ class _Outermost(ArrayRecord):
                 ink = -polarity * some.profiles[rows]
                 sharp = tuple((polarity * of[0], *of[1:3], polarity * of[3]) for of in _EDGES)
                 found = _better(ink, family, size, sharp)
-                soft = _DEFOCUSED * family.narrow * SIZE_STEP**size
+                soft = DEFOCUSED * family.narrow * SIZE_STEP**size
                 if soft > _EDGES[0][1]:
                     left = np.flatnonzero(found == 0)
                     defocused = ((0.0, soft, 0.0, 0.0),)

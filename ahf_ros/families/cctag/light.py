@@ -104,6 +104,11 @@ class Lights(ArrayRecord):
             rows, more = rows[better], more.select(better)
             scene = scene.select(better).in_light(more)
             fit = scene.fit(more.edges, number + 1)
+            # Edges that are no light make up for a frame that is not in its place.
+            lit = (np.abs(fit.heights[:, _OTHERS:]) <= _MOST_LIGHT).all(axis=1)
+            rows, scene, fit = rows[lit], scene.select(lit), fit.select(lit)
+            if not len(rows):
+                break
             slope[rows], edges[rows], heights[rows] = scene.slope, fit.edges, fit.heights
         changes = np.zeros((count, 5))
         changes[:, _MOVES] = np.clip(heights[:, 2:_OTHERS], -_MOST_MOVED, _MOST_MOVED)

@@ -9,6 +9,7 @@ from ahf_ros.families.cctag.prior import Prior
 from ahf_ros.families.cctag.rays import PROFILE, RAYS
 from ahf_ros.families.cctag.rings import Likely
 from ahf_ros.families.cctag.templates import (
+    SIZE_STEP,
     by_value,
     less_lines,
     shares_of,
@@ -53,7 +54,8 @@ def likely_ids(
             some = of_size[clipped[each[of_size]] == of]
             if not len(some):
                 continue
-            of_rings, tried = templates(family, step, prior.tried(polarity * of))
+            edges_tried = prior.tried(polarity * of, family.narrow * SIZE_STEP**step)
+            of_rings, tried = templates(family, step, edges_tried)
             found = shares_of(profiles[some], of_rings)
             found = found.reshape(len(some), -1, shape[2])
             of_each[some], edges_of_each[some] = found.max(axis=1), tried[found.argmax(axis=1)]

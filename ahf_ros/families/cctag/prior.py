@@ -11,7 +11,7 @@ import numpy as np
 
 from ahf_ros.families.cctag.rays import PROFILE
 from ahf_ros.families.cctag.rings import Aligned, Likely
-from ahf_ros.families.cctag.templates import CLIPPED, Edge
+from ahf_ros.families.cctag.templates import CLIPPED, DEFOCUSED, Edge
 from ahf_ros.families.words import against
 from ahf_ros.vision.robust import NORMAL
 
@@ -65,14 +65,17 @@ class Prior:
         )
 
     @lru_cache(maxsize=64)  # noqa: B019, as a prior is a few numbers
-    def tried(self, polarity: int) -> tuple[Edge, ...]:
-        """Return the edges of templates, also clipped ones unless the polarity is 0."""
+    def tried(self, polarity: int, narrow: float) -> tuple[Edge, ...]:
+        """Return the edges of templates, for narrow rings of so many px.
+
+        They include those out of focus, and clipped ones unless the polarity is 0.
+        """
         of_shift, of_blur, of_sharpening = self.deviations
         tried = list(product(_TRIED_SHIFTS, _TRIED_BLURS, [(0.0, 0.0)]))
         others = [(more, 0.0) for more in _TRIED_SHARPENINGS]
         others += [(0.0, polarity * of) for of in CLIPPED if polarity]
         tried += list(product(_TRIED_SHIFTS[::2], [0.0], others))
-        return tuple(
+        edges = [
             (
                 round(self.shift + shift * of_shift, 2),
                 round(self.blur * math.exp(blur * of_blur), 2),
@@ -80,7 +83,11 @@ class Prior:
                 clipped,
             )
             for shift, blur, (more, clipped) in tried
-        )
+        ]
+        soft = round(DEFOCUSED * narrow, 2)
+        if soft > max(blur for _, blur, *_ in edges):
+            edges.append((self.shift, soft, 0.0, 0.0))
+        return tuple(edges)
 
     def sharpening_of(self, rings: Aligned) -> np.ndarray:
         """Return the sharpening of rings (k,), or that of the camera if it is known."""

@@ -27,6 +27,8 @@ Below 0 it is clipped from bright ink, otherwise from bright paper.
 
 _LEAST_TOTAL = 1e-9  # of squares of a weighted profile
 _USUAL_EDGE: Edge = (0.0, 0.9, 0.0, 0.0)
+DEFOCUSED = 0.6
+"""Blur of an image that is out of focus, in narrow rings."""
 CLIPPED = 0.25, 0.5
 """Shares of the contrast that over-exposure clips."""
 
