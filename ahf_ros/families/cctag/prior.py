@@ -17,6 +17,7 @@ from ahf_ros.vision.robust import NORMAL
 
 _TRIED_SHIFTS = -1.2, -0.6, 0.0, 0.6, 1.2  # deviations
 _TRIED_BLURS, _TRIED_SHARPENINGS = (-1.0, 0.0, 1.4), (3.0, 7.0)  # the same
+_SOFTER = 1.6  # ratio of blurs that are tried of rings out of focus
 _ENOUGH = 4  # certain targets, that tell of the edges of an image
 _OF_CAMERA = 0.03  # standard deviation of the sharpening of one camera
 _OF_IMAGE = 0.1  # of growth, ln of the blur and sharpening, of an image's targets
@@ -84,9 +85,10 @@ class Prior:
             )
             for shift, blur, (more, clipped) in tried
         ]
-        soft = round(DEFOCUSED * narrow, 2)
-        if soft > max(blur for _, blur, *_ in edges):
-            edges.append((self.shift, soft, 0.0, 0.0))
+        blur = max(blur for _, blur, *_ in edges)
+        while blur < DEFOCUSED * narrow:
+            blur *= _SOFTER
+            edges.append((self.shift, round(blur, 2), 0.0, 0.0))
         return tuple(edges)
 
     def sharpening_of(self, rings: Aligned) -> np.ndarray:
