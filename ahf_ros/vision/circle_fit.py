@@ -23,6 +23,7 @@ from ahf_ros.vision.edge_errors import (
 from ahf_ros.vision.edge_fit import WEAK_PRIOR, EdgeFit, EdgeKind, Outlines, fit_edges
 from ahf_ros.vision.growth import growth_in_light
 from ahf_ros.vision.profiles import BLURS, USUAL_BLUR, Edges
+from ahf_ros.vision.pyramid import halved
 from ahf_ros.vision.robust import median
 
 ENOUGH = 0.5
@@ -31,6 +32,7 @@ ENOUGH = 0.5
 SOFT = 1.0
 """Blur from which on an edge is soft, standard deviation in px."""
 
+_SOFTEST = 3.0  # blur, px, from which profiles may be too short
 _SOFT_ROUNDS = 4  # of measurements of soft edges
 _MINIMUM_SPREAD = 0.5  # that counts as usual, in deviations that noise alone would cause
 _ROUNDS = 4  # of robust least squares
@@ -83,6 +85,17 @@ class Fit(ArrayRecord):
     def clearness(self) -> np.ndarray:
         """How whole outlines are, and how dark ink is, from 0 to 1, shape (k,)."""
         return self.share * (1 - self.contrast)
+
+    def enlarged(self) -> Fit:
+        """Return the same in px of the image of which it was fitted to a half."""
+        return replace(
+            self,
+            frames=frame.enlarged(self.frames, 1),
+            deviation=2 * self.deviation,
+            covariance=4 * self.covariance,
+            blur=2 * self.blur,
+            edge_shift=2 * self.edge_shift,
+        )
 
     def clearest(self, most: int | None = None) -> np.ndarray:
         """Return the indices of the clearest targets, these first, so many at the most."""
@@ -155,6 +168,8 @@ def fit_circles_of_any_blur(
     How soft edges are is known only when they have been measured. A step that is sharper than an
     edge is fitted to a part of it, at the wrong place. The shortest profiles, of 1 px, show the
     usual blur, and longer ones as much softer edges: beyond, the fit of a narrow ellipse is lost.
+    Edges that are softer than profiles can be are measured in the image at half its size: in a
+    profile that is shorter than the blur, noise looks like an edge.
     """
     softest = np.clip(USUAL_BLUR * np.ravel(reach) * frame.ellipse_axes(frames)[1], *BLURS)
     fit = fit_circles(
@@ -181,7 +196,20 @@ def fit_circles_of_any_blur(
         softest=softest[soft],
     )
     good = again.share >= ENOUGH
-    return fit.replaced(soft[good], again.select(good))
+    fit = fit.replaced(soft[good], again.select(good))
+    softer = np.flatnonzero((fit.blur >= _SOFTEST) & (fit.share >= ENOUGH))
+    if not softer.size:
+        return fit
+    again = fit_circles_of_any_blur(
+        halved(gray, 1)[1],
+        frame.enlarged(fit.frames[softer], -1),
+        replace(circles, polarity=circles.polarity[softer]),
+        reach=np.broadcast_to(reach, (len(frames), 1))[softer],
+        projective=projective,
+        rounds=_SOFT_ROUNDS,
+    ).enlarged()
+    good = again.share >= ENOUGH
+    return fit.replaced(softer[good], again.select(good))
 
 
 def fit_circles(

@@ -5,13 +5,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ahf_ros.families import DetectorSettings
+from ahf_ros.families import DetectorSettings, create_detector
 from ahf_ros.families.ring.counting import estimate_count
 from ahf_ros.prints import VENDOR_NAMES
 from ahf_ros.scenes.evaluation import score
 from ahf_ros.scenes.scene import SceneSettings, render
 from support.collage import Collage, collage
-from support.scenes import counts, identified
+from support.scenes import counted, counts, errors, identified, rendering
 from support.square_markers import needs_square_markers
 
 pytestmark = pytest.mark.lasting
@@ -54,6 +54,31 @@ def test_large_dots_in_projected_light_that_are_seen_from_the_side(
     )
     check(shown, 'metashape12')
     assert estimate_count(shown.image, DetectorSettings(family='metashape12')) == len(shown.truth)
+
+
+@pytest.mark.parametrize(
+    ('family', 'radius', 'blur', 'size'),
+    [
+        ('metashape12', 60.0, 9.0, (1500, 1100)),
+        ('dots', 60.0, 6.0, (1500, 1100)),
+        ('gsi', 20.0, 5.0, (2000, 1500)),
+    ],
+)
+def test_edges_that_are_softer_than_profiles_are_measured_in_halves(
+    family: str, radius: float, blur: float, size: tuple[int, int]
+) -> None:
+    width, height = size
+    shown = rendering(
+        family=family, dot_radius=radius, blur=blur, width=width, height=height, targets=2, seed=4
+    )
+    found = create_detector(family=family)(shown.image)
+    assert counted(shown, found) == (2, 0, 0)
+    away = errors(shown, found)
+    assert np.abs(away).max() < 0.07
+    truth = {it.id: (it.x, it.y) for it in shown.targets}
+    for it in found:
+        error = np.subtract((it.x, it.y), truth[it.id])
+        assert error @ np.linalg.inv(np.reshape(it.covariance, (2, 2))) @ error < 20
 
 
 def test_limits_are_obeyed_at_every_size() -> None:

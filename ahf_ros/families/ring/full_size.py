@@ -18,6 +18,7 @@ from ahf_ros.families.ring.hypotheses import Hypotheses
 from ahf_ros.families.ring.reading import PER_SECTOR
 from ahf_ros.vision import frame
 from ahf_ros.vision.circle_fit import ENOUGH, SOFT, fit_circles_of_any_blur
+from ahf_ros.vision.profiles import BLURS
 
 
 def at_full_size(images: Sequence[np.ndarray], read: Hypotheses) -> Hypotheses:
@@ -34,7 +35,8 @@ def at_full_size(images: Sequence[np.ndarray], read: Hypotheses) -> Hypotheses:
             blur=2 * read.blur,
             edge_shift=2 * read.edge_shift,
         )
-        read = _measured(image, read, read.certain)
+        # Where edges are soft in a half, the image has no sharper ones.
+        read = _measured(image, read, read.certain & (read.blur < BLURS[1]))
     return read
 
 
