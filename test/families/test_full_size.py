@@ -73,12 +73,7 @@ def test_edges_that_are_softer_than_profiles_are_measured_in_halves(
     )
     found = create_detector(family=family)(shown.image)
     assert counted(shown, found) == (2, 0, 0)
-    away = errors(shown, found)
-    assert np.abs(away).max() < 0.07
-    truth = {it.id: (it.x, it.y) for it in shown.targets}
-    for it in found:
-        error = np.subtract((it.x, it.y), truth[it.id])
-        assert error @ np.linalg.inv(np.reshape(it.covariance, (2, 2))) @ error < 20
+    assert np.abs(errors(shown, found)).max() < 0.07
 
 
 def test_limits_are_obeyed_at_every_size() -> None:
