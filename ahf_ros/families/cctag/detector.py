@@ -59,7 +59,7 @@ _IN_A_ROW = 32  # likely frames without a target, which hardly any others preced
 _CERTAIN = 0.75  # confidence from which a target is reported
 _SURE_OF_TARGET = 0.9  # probability of a target, from which it is reported without its ID
 _LARGE = 6.0  # narrow rings, px, whose edges are measured one by one where they are sharp
-_OF_RAYS = 160.0  # radius, px, up to which rays have places enough for edges that are soft
+_OF_RAYS = 160.0  # semi-minor axis, px, up to which rays have places enough for soft edges
 _PLAUSIBLE = 0.6  # share of rays that agree, of a target that is measured again
 _SAME_PLACE = 0.5  # distance of two readings of one target, radii
 _OVERLAPPING = 0.7  # distance up to which targets overlap, sums of their radii
@@ -108,7 +108,9 @@ class CctagDetector(PyramidDetector):
         refined = list(targets)
         for family in self.design:
             known = [it for it in targets if it.id != UNDECODED and it.family == family.name]
-            refined, known = _by_edges(gray, refined, known, family)
+            placed = _placed_by_edges(gray, known, family)
+            refined = [placed.get(it, it) for it in refined]
+            known = [it for it in known if it not in placed and it.semi_minor <= _OF_RAYS]
             if not known:
                 continue
             start = frames_of(known)
@@ -120,7 +122,6 @@ class CctagDetector(PyramidDetector):
             of = align(gray, start, ids, edges, family)
             light, of, _ = in_light(gray, of, family)
             good = stayed(of.frames, start) & (of.rays >= _PLAUSIBLE)
-            good &= frame.mean_radii(start) <= _OF_RAYS
             of = of.replaced(good, jointly(gray, light, of.select(good), family))
             places = ellipse_fields(of.frames, of.covariance, of.edge_shift)
             refined = moved_targets(refined, known, places, good)
@@ -366,22 +367,22 @@ def _owned(gray: np.ndarray, rings: Aligned, polarity: int, family: CctagPrint) 
     return replace(rings, margin=np.minimum(rings.margin, against + of_family))
 
 
-def _by_edges(
-    gray: np.ndarray, targets: Sequence[Target], known: Sequence[Target], family: CctagPrint
-) -> tuple[list[Target], list[Target]]:
-    """Return targets, large known ones in the places of their sharp edges, and the others."""
-    refined, left = list(targets), []
-    for number, polarity in sorted({(it.id, it.polarity) for it in known}):
-        some = [it for it in known if (it.id, it.polarity) == (number, polarity)]
+def _placed_by_edges(
+    gray: np.ndarray, targets: Sequence[Target], family: CctagPrint
+) -> dict[Target, Target]:
+    """Return the large ones of targets whose edges are sharp, in the places of these."""
+    large = [it for it in targets if it.semi_minor * family.narrow >= _LARGE]
+    placed = {}
+    for number, polarity in sorted({(it.id, it.polarity) for it in large}):
+        some = [it for it in large if (it.id, it.polarity) == (number, polarity)]
         start = frames_of(some)
-        of = fit_rings(gray, start, number, np.full(len(some), polarity), family)
-        good = (of.share >= ENOUGH) & stayed(of.frames, start)
-        good &= frame.ellipse_axes(start)[1] * family.narrow >= _LARGE
+        fit = fit_rings(gray, start, number, np.full(len(some), polarity), family)
+        good = (fit.share >= ENOUGH) & stayed(fit.frames, start)
         good &= are_sharp(gray, start, number, family)
-        places = ellipse_fields(of.frames, of.covariance, of.growth)
-        refined = moved_targets(refined, some, places, good)
-        left += [it for it, done in zip(some, good, strict=True) if not done]
-    return refined, left
+        fields = ellipse_fields(fit.frames, fit.covariance, fit.growth)
+        moved = moved_targets(some, some, fields, good)
+        placed |= {old: new for old, new, done in zip(some, moved, good, strict=True) if done}
+    return placed
 
 
 def _circles(of_octaves: Sequence[Octave]) -> list[Dots]:

@@ -16,10 +16,8 @@ from ahf_ros.vision.sampling import sample_circles
 
 _RAYS = 48  # about each circle
 _ANGLES = 2 * np.pi * np.arange(_RAYS) / _RAYS
-_BESIDE, _SHARP = (
-    2.5,
-    0.75,
-)  # distance to both sides of an edge, px, within which it has that share
+_BESIDE = 2.5  # distance to both sides of an edge, px...
+_SHARP = 0.75  # ... within which it has that share of the contrast of rings
 _REACH = 0.45  # distance from a circle to look for its edge, narrow rings: not to the next
 
 
