@@ -22,7 +22,7 @@ from ahf_ros.vision.edge_errors import (
 )
 from ahf_ros.vision.edge_fit import WEAK_PRIOR, EdgeFit, EdgeKind, Outlines, fit_edges
 from ahf_ros.vision.growth import growth_in_light
-from ahf_ros.vision.profiles import BLURS, USUAL_BLUR, Edges
+from ahf_ros.vision.profiles import BLURS, SOFTEST, USUAL_BLUR, Edges
 from ahf_ros.vision.pyramid import halved
 from ahf_ros.vision.robust import median
 
@@ -32,7 +32,6 @@ ENOUGH = 0.5
 SOFT = 1.0
 """Blur from which on an edge is soft, standard deviation in px."""
 
-_SOFTEST = 3.0  # blur, px, from which profiles may be too short
 _SOFT_ROUNDS = 4  # of measurements of soft edges
 _MINIMUM_SPREAD = 0.5  # that counts as usual, in deviations that noise alone would cause
 _ROUNDS = 4  # of robust least squares
@@ -168,8 +167,7 @@ def fit_circles_of_any_blur(
     How soft edges are is known only when they have been measured. A step that is sharper than an
     edge is fitted to a part of it, at the wrong place. The shortest profiles, of 1 px, show the
     usual blur, and longer ones as much softer edges: beyond, the fit of a narrow ellipse is lost.
-    Edges that are softer than profiles can be are measured in the image at half its size: in a
-    profile that is shorter than the blur, noise looks like an edge.
+    Edges that are softer than profiles are measured in the image at half its size.
     """
     softest = np.clip(USUAL_BLUR * np.ravel(reach) * frame.ellipse_axes(frames)[1], *BLURS)
     fit = fit_circles(
@@ -197,7 +195,7 @@ def fit_circles_of_any_blur(
     )
     good = again.share >= ENOUGH
     fit = fit.replaced(soft[good], again.select(good))
-    softer = np.flatnonzero((fit.blur >= _SOFTEST) & (fit.share >= ENOUGH))
+    softer = np.flatnonzero((fit.blur >= SOFTEST) & (fit.share >= ENOUGH))
     if not softer.size:
         return fit
     again = fit_circles_of_any_blur(

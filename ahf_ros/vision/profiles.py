@@ -24,6 +24,11 @@ USUAL_BLUR = 0.8
 
 BLURS = (0.5, 4.0)
 """Sharpest and softest step that is fitted, standard deviation in px."""
+SOFTEST = 3.0
+"""Blur from which profiles may be too short, px; a half of the image has half of it.
+
+In a profile that is shorter than the blur, noise looks like an edge.
+"""
 
 CORRELATION = 1.9
 """Distance along an edge from where on the errors of profiles are independent, px."""

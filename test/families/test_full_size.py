@@ -76,6 +76,19 @@ def test_edges_that_are_softer_than_profiles_are_measured_in_halves(
     assert np.abs(errors(shown, found)).max() < 0.07
 
 
+@needs_square_markers
+def test_soft_square_markers_are_as_uncertain_as_they_say() -> None:
+    family, size = 'apriltag_36h11', {'width': 2600, 'height': 1820, 'dot_radius': 80.0}
+    shown = rendering(family=family, **size, blur=6.0, targets=2, seed=5)
+    found = create_detector(family=family)(shown.image)
+    assert counted(shown, found) == (2, 0, 0)
+    truth = {it.id: (it.x, it.y) for it in shown.targets}
+    for it in found:
+        away = np.subtract((it.x, it.y), truth[it.id])
+        assert np.hypot(*away) < 0.03
+        assert away @ np.linalg.inv(np.reshape(it.covariance, (2, 2))) @ away < 9
+
+
 def test_limits_are_obeyed_at_every_size() -> None:
     shown = collage([100.0, 50.0, 20.0])
     ids = [target.id for target in shown.truth]

@@ -28,9 +28,10 @@ from ahf_ros.vision.edge_errors import (
     smooth_slopes,
 )
 from ahf_ros.vision.edge_fit import WEAK_PRIOR, EdgeKind, Outlines, fit_edges
-from ahf_ros.vision.frame import centre_covariance, changed, outline_basis, project
+from ahf_ros.vision.frame import centre_covariance, changed, outline_basis, project, reduced
 from ahf_ros.vision.growth import growth_in_light
-from ahf_ros.vision.profiles import BLURS, USUAL_BLUR, Edges
+from ahf_ros.vision.profiles import BLURS, SOFTEST, USUAL_BLUR, Edges
+from ahf_ros.vision.pyramid import halved
 from ahf_ros.vision.robust import geman_mcclure_gain, median
 
 _ALONG = np.array([0.25, 0.5, 0.75])  # where edges are measured along a cell
@@ -58,6 +59,8 @@ def fit_markers(
 ) -> Places:
     """Return markers placed by the edges of their prints, or unmeasured where these are not seen.
 
+    Edges that are softer than profiles are measured in the image at half its size.
+
     Parameters
     ----------
     gray : ndarray of float32, shape (height, width)
@@ -70,19 +73,27 @@ def fit_markers(
     flat : bool
         Whether they are flat. Edges of others may be farther off, which adds to the covariance.
     """
-    places = Places.unmeasured(corners)
+    places, blurs = Places.unmeasured(corners), np.zeros(len(corners))
     large = side_lengths(corners).min(axis=1) >= _SMALLEST_CELL * prints.shape[1]
     for first in range(0, len(corners), _TOGETHER):
         which = first + np.flatnonzero(large[first : first + _TOGETHER])
         for inside_first in (False, True):
             if not which.size:
                 break
-            found = _fitted(gray, corners[which], prints[which], inside_first, flat)
+            found, blur = _fitted(gray, corners[which], prints[which], inside_first, flat)
             better = found.share > places.share[which]
+            blurs[which[better]] = blur[better]
             places = places.replaced(which[better], found.select(better))
             which = which[places.share[which] < _DOUBTFUL]
     refused = places.share < _ENOUGH
-    return places.replaced(refused, Places.unmeasured(corners[refused]))
+    places = places.replaced(refused, Places.unmeasured(corners[refused]))
+    soft = np.flatnonzero((blurs >= SOFTEST) & ~refused)
+    if not soft.size:
+        return places
+    half, smaller = halved(gray, 1)[1], reduced(places.corners[soft], 1)
+    again = fit_markers(half, smaller, prints[soft], flat=flat)
+    seen = again.share >= places.share[soft]
+    return places.replaced(soft[seen], again.select(seen).enlarged())
 
 
 @lru_cache
@@ -133,8 +144,8 @@ def _kind(cells: int) -> EdgeKind:
 
 def _fitted(
     gray: np.ndarray, corners: np.ndarray, prints: np.ndarray, inside_first: bool, flat: bool
-) -> Places:
-    """Return markers fitted to their edges, or at first to those inside."""
+) -> tuple[Places, np.ndarray]:
+    """Return markers fitted to their edges, or at first to those inside, and their blur, px."""
     cells = prints.shape[1]
     grid, kind, expected = _grid(cells), _kind(cells), _polarity(prints)
     frames, cell = square_frames(corners), side_lengths(corners).min(axis=1) / cells
@@ -166,4 +177,4 @@ def _fitted(
         bent = (own.seen * errors**2).sum(axis=1) / np.maximum(own.seen.sum(axis=1), 1)
         covariance += bent[:, None, None] * np.eye(2)
     growth = growth_in_light(fit.unknowns[:, -1], blur, own.contrast)
-    return Places(project(frames, SQUARE), share, covariance, growth)
+    return Places(project(frames, SQUARE), share, covariance, growth), blur

@@ -8,6 +8,7 @@ import numpy as np
 
 from ahf_ros import kernels
 from ahf_ros.vision.array_record import ArrayRecord
+from ahf_ros.vision.frame import reduced
 
 SQUARE = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])
 """Corners of the square about the origin with sides of 1."""
@@ -40,6 +41,11 @@ class Places(ArrayRecord):
         """Return markers of which only corners are known."""
         count = len(corners)
         return cls(corners, np.zeros(count), np.zeros((count, 2, 2)), np.full(count, np.nan))
+
+    def enlarged(self) -> Places:
+        """Return the same in px of the image of which they were measured in a half."""
+        corners = reduced(self.corners, -1)
+        return Places(corners, self.share, 4 * self.covariance, 2 * self.edge_shift)
 
 
 def centres(corners: np.ndarray) -> np.ndarray:
