@@ -372,7 +372,7 @@ def _placed_by_edges(
 ) -> dict[Target, Target]:
     """Return the large ones of targets whose edges are sharp, in the places of these."""
     large = [it for it in targets if it.semi_minor * family.narrow >= _LARGE]
-    placed = {}
+    placed: dict[Target, Target] = {}
     for number, polarity in sorted({(it.id, it.polarity) for it in large}):
         some = [it for it in large if (it.id, it.polarity) == (number, polarity)]
         start = frames_of(some)
