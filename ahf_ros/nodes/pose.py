@@ -1,6 +1,7 @@
 """The node `pose`: where the camera of each image is among targets of known coordinates."""
 
 import time
+from collections.abc import Sequence
 from contextlib import suppress
 from functools import partial
 from importlib import import_module
@@ -10,7 +11,8 @@ import numpy as np
 from diagnostic_msgs.msg import DiagnosticStatus
 from geometry_msgs.msg import PoseWithCovarianceStamped
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
-from rclpy.node import NodeNameNonExistentError
+from rclpy.node import Node, NodeNameNonExistentError
+from rclpy.topic_endpoint_info import TopicEndpointInfo
 from sensor_msgs.msg import CameraInfo
 from std_msgs.msg import Header
 
@@ -249,18 +251,26 @@ class PoseNode(ProcessNode):
             source = self._camera_info
             why = silence(source, source.publishers(), topics)
             tally.uncalibrated = f'no camera_info: {why}'
-        read = set()
-        for it in publishers:
-            with suppress(NodeNameNonExistentError):  # it has ended meanwhile
-                heard = self.get_subscriber_names_and_types_by_node(
-                    it.node_name, it.node_namespace
-                )
-                read |= {topic for topic, kinds in heard if kinds[0] in _IMAGES}
-        self._images_of_detector = tuple(sorted(read))
+        self._images_of_detector = images_heard(self, publishers)
 
     def _status(self) -> DiagnosticStatus:
         self._look()
         return self._diagnostics.status(PERIOD)
+
+
+def images_heard(node: Node, publishers: Sequence[TopicEndpointInfo]) -> tuple[str, ...]:
+    """Return the topics of images that the nodes of some publishers subscribe to, in order.
+
+    A publisher may be known before its node is, and while that ends.
+    """
+    read = set()
+    for it in publishers:
+        if not it.node_namespace.startswith('/'):  # of a node that is not known yet
+            continue
+        with suppress(NodeNameNonExistentError):
+            heard = node.get_subscriber_names_and_types_by_node(it.node_name, it.node_namespace)
+            read |= {topic for topic, kinds in heard if kinds[0] in _IMAGES}
+    return tuple(sorted(read))
 
 
 def _turn(pose: Pose) -> float:

@@ -25,6 +25,7 @@ from ahf_ros.base.target import Target
 from ahf_ros.files.camera_info import calibration, undistorted
 from ahf_ros.msg import CodedTarget, CodedTargetArray
 from ahf_ros.network.camera import project
+from ahf_ros.nodes.pose import images_heard
 from support.detector import overrides, own, values
 from support.poses import CAMERA, SIZE, View, view
 
@@ -314,3 +315,13 @@ def test_tf_has_one_parent(graph: Any, tmp_path: Path, parent: str) -> None:
     static = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
     graph.node.create_publisher(TFMessage, f'{space}/tf_static', static).publish(other)
     node.says(image, f"no tf: '{frames[child]}' has the parent 'base' already, accepted is one")
+
+
+def test_publishers_of_nodes_that_are_not_known_yet_are_passed_over(graph: Any) -> None:
+    node = graph.node
+    node.create_subscription(Image, 'image', print, 1)
+    graph.publisher(Image, 'image')
+    (known,) = graph.until(lambda: node.get_publishers_info_by_topic('image'))
+    unknown = copy(known)
+    unknown.node_name, unknown.node_namespace = '_NODE_NAME_UNKNOWN_', '_NODE_NAMESPACE_UNKNOWN_'
+    assert graph.until(lambda: images_heard(node, [unknown, known])) == ('/image',)
