@@ -18,7 +18,7 @@ import numpy as np
 from ahf_ros.base.blas import one_blas_thread
 from ahf_ros.base.target import UNDECODED, Target, sorted_targets
 from ahf_ros.families.cctag.alignment import align
-from ahf_ros.families.cctag.full_size import are_sharp, fit_rings
+from ahf_ros.families.cctag.full_size import fit_rings, is_sharp
 from ahf_ros.families.cctag.glance import LARGEST, Circles, likely_rings
 from ahf_ros.families.cctag.joint import contested, jointly
 from ahf_ros.families.cctag.light import EDGES, Lights, shares_alike
@@ -372,16 +372,17 @@ def _placed_by_edges(
 ) -> dict[Target, Target]:
     """Return the large ones of targets whose edges are sharp, in the places of these."""
     large = [it for it in targets if it.semi_minor * family.narrow >= _LARGE]
+    large = [it for it in large if is_sharp(gray, it, family)]
     placed: dict[Target, Target] = {}
     for number, polarity in sorted({(it.id, it.polarity) for it in large}):
         some = [it for it in large if (it.id, it.polarity) == (number, polarity)]
         start = frames_of(some)
         fit = fit_rings(gray, start, number, np.full(len(some), polarity), family)
         good = (fit.share >= ENOUGH) & stayed(fit.frames, start)
-        good &= are_sharp(gray, start, number, family)
-        fields = ellipse_fields(fit.frames, fit.covariance, fit.growth)
-        moved = moved_targets(some, some, fields, good)
-        placed |= {old: new for old, new, done in zip(some, moved, good, strict=True) if done}
+        places = ellipse_fields(fit.frames, fit.covariance, fit.growth)
+        placed |= {
+            it: replace(it, **of) for it, of, ok in zip(some, places, good, strict=True) if ok
+        }
     return placed
 
 

@@ -8,10 +8,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from ahf_ros.base.target import Target
 from ahf_ros.prints.cctag import CctagPrint
-from ahf_ros.vision import frame
 from ahf_ros.vision.circle_fit import Fit, fit_circles_of_any_blur, on_circles
 from ahf_ros.vision.edge_fit import Outlines
+from ahf_ros.vision.ellipse_targets import frames_of
 from ahf_ros.vision.sampling import sample_circles
 
 _RAYS = 48  # about each circle
@@ -37,23 +38,19 @@ def fit_rings(
     )
 
 
-def are_sharp(gray: np.ndarray, frames: np.ndarray, number: int, family: CctagPrint) -> np.ndarray:
-    """Return whether most of the contrast of the rings of an ID is within a few px, (k,).
+def is_sharp(gray: np.ndarray, target: Target, family: CctagPrint) -> bool:
+    """Return whether most of the contrast of the rings of a target is within a few px.
 
     Noise looks like an edge where a blur of more px has left none.
     """
-    radii = family.radii(np.array([number]))[0]
+    radii, beside = family.radii(np.array([target.id]))[0], _BESIDE / target.semi_minor
     ends = np.array([radii[0] + family.narrow, *radii, radii[-1] - family.narrow])
     middles = (ends[1:] + ends[:-1]) / 2
-    sharp = np.empty(len(frames), bool)
-    for row, size in enumerate(frame.ellipse_axes(frames)[1].tolist()):
-        beside = radii + _BESIDE / size, radii - _BESIDE / size
-        at = np.concatenate([middles, *beside])
-        values = sample_circles(gray, frames[row : row + 1], _ANGLES, at).mean(axis=(0, 1))
-        of_rings, outside, inside = np.split(values, np.cumsum([len(middles), len(radii)]))
-        contrast = np.abs(np.diff(of_rings)).sum()
-        sharp[row] = np.abs(outside - inside).sum() >= _SHARP * contrast
-    return sharp
+    at = np.concatenate([middles, radii + beside, radii - beside])
+    values = sample_circles(gray, frames_of([target]), _ANGLES, at).mean(axis=(0, 1))
+    of_rings, outside, inside = np.split(values, np.cumsum([len(middles), len(radii)]))
+    contrast = np.abs(np.diff(of_rings)).sum()
+    return bool(np.abs(outside - inside).sum() >= _SHARP * contrast)
 
 
 def _circles(number: int, polarity: np.ndarray, family: CctagPrint) -> Outlines:

@@ -105,8 +105,8 @@ class Lights(ArrayRecord):
             scene = scene.select(better).in_light(more)
             fit = scene.fit(more.edges, number + 1)
             # Edges that are no light make up for a frame that is not in its place.
-            lit = (np.abs(fit.heights[:, _OTHERS:]) <= _MOST_LIGHT).all(axis=1)
-            rows, scene, fit = rows[lit], scene.select(lit), fit.select(lit)
+            likely = (np.abs(fit.heights[:, _OTHERS:]) <= _MOST_LIGHT).all(axis=1)
+            rows, scene, fit = rows[likely], scene.select(likely), fit.select(likely)
             if not len(rows):
                 break
             slope[rows], edges[rows], heights[rows] = scene.slope, fit.edges, fit.heights

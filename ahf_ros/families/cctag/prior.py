@@ -65,7 +65,7 @@ class Prior:
             [shift - self.shift, np.log(blur / self.blur), sharpening - self.sharpening], axis=1
         )
 
-    @lru_cache(maxsize=64)  # noqa: B019, as a prior is a few numbers
+    @lru_cache(maxsize=256)  # noqa: B019, as a prior is a few numbers
     def tried(self, polarity: int, narrow: float) -> tuple[Edge, ...]:
         """Return the edges of templates, for narrow rings of so many px.
 
