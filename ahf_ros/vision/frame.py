@@ -155,8 +155,8 @@ def enlarged(frames: np.ndarray, level: int) -> np.ndarray:
 
 
 def reduced(points: np.ndarray, level: int) -> np.ndarray:
-    """Return points in the pixels of the image that is halved `level` times."""
-    return (points + 0.5) / 2**level - 0.5
+    """Return points in px of the image that is halved `level` times, or doubled if below 0."""
+    return (points + 0.5) / 2.0**level - 0.5
 
 
 def ellipse_axes(frames: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -113,7 +113,7 @@ class SquareDetector(ExpectingDetector):
         for level, half in enumerate(halves):
             corners = find_quadrilaterals(half, small=not level)
             if level:  # where light, a lens or enlargement spreads edges
-                corners = corners[~_are_read(_enlarged(corners, level), Readings.joined(found))]
+                corners = corners[~_are_read(reduced(corners, -level), Readings.joined(found))]
             small = np.linalg.norm(corners[:, 2] - corners[:, 0], axis=1) < _SMALL
             outlines = lay_outlines(half, corners[small])
             if level:  # straight edges may do as well
@@ -121,7 +121,7 @@ class SquareDetector(ExpectingDetector):
             else:
                 corners[small] = outlines
             of_half = read(half, corners, groups, expected, everything=everything)
-            of_half = replace(of_half, corners=_enlarged(of_half.corners, level))
+            of_half = replace(of_half, corners=reduced(of_half.corners, -level))
             found.append(self._compared(halves[: level + 1], of_half, groups))
         readings = Readings.joined(found)
         laid = read(gray, _laid(gray, readings, groups), groups, expected)
@@ -149,7 +149,7 @@ class SquareDetector(ExpectingDetector):
         for own in np.unique(finest[finer]).tolist():
             corners = reduced(readings.corners[finer & (finest == own)], own)
             seen = read(halves[own], corners, groups, self.expected)
-            shown.append(replace(seen, corners=_enlarged(seen.corners, own)))
+            shown.append(replace(seen, corners=reduced(seen.corners, -own)))
         return Readings.joined(shown)
 
     @one_blas_thread()
@@ -200,11 +200,6 @@ def _markers(readings: Readings, decoded: np.ndarray, groups: Groups) -> list[Sq
             *(of.tolist() for of in columns), fields, strict=True
         )
     ]
-
-
-def _enlarged(corners: np.ndarray, level: int) -> np.ndarray:
-    """Return corners in an image halved so often as they are in the image."""
-    return (corners + 0.5) * 2**level - 0.5
 
 
 def _are_read(places: np.ndarray, readings: Readings) -> np.ndarray:
@@ -333,7 +328,7 @@ def _from_halves(gray: np.ndarray, corners: np.ndarray, ink: np.ndarray) -> np.n
         which = np.flatnonzero(halvings >= level)
         fit = fit_markers(halves[level], reduced(corners[which], level), ink[which])
         good = fit.share > 0
-        corners[which[good]] = _enlarged(fit.corners[good], level)
+        corners[which[good]] = reduced(fit.corners[good], -level)
     return corners
 
 
